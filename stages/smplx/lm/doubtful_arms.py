@@ -78,7 +78,7 @@ def find_contradicted(arms: HiddenArms, problem: Problem, state: State, missing:
             out[first:last, side] |= last - first >= DOUBTS
         far = np.flatnonzero(arm > ALONE)
         out[far, side] |= measure_uncovered(arms, problem, state, far) > UNCOVERED
-    return out & ~arms.mark(len(out))
+    return out & ~arms.mark_held(len(out))
 
 
 def measure_uncovered(arms: HiddenArms, problem: Problem, state: State, frames: np.ndarray) -> np.ndarray:
@@ -110,7 +110,7 @@ def find_untold(arms: HiddenArms, problem: Problem, state: State, missing: np.nd
             others, around = np.delete(missing[:, side], np.s_[first:last]), np.ptp(np.unwrap(turn[first:last]))
             away = around > ARC or has_moved(arms, problem, chain, side, first, last)
             out[first:last, side] |= len(others) >= DOUBTS and 1 - others.mean() > TRUSTED and away
-    return out & ~arms.mark(len(out))
+    return out & ~arms.mark_held(len(out))
 
 
 def find_near(arms: HiddenArms, state: State, chain: Chain, side: int) -> np.ndarray:

@@ -24,6 +24,7 @@ from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, move, settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, describe_arms, widen_arm
+from gsac.stages.smplx.lm.hidden_search import search_hidden
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
@@ -57,7 +58,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     hidden = HiddenArms.of(body, sightings.person_height)
     state, moved = move_contradicted(hidden, problem, state, sightings.missing)
     hidden.find(problem, state, sightings.missing)
-    state = hidden.search(problem, state)
+    state = search_hidden(hidden, problem, state)
     iou = np.full(len(sightings.xy), np.nan)
     problem.outline_weight, problem.limit, problem.seen.depth_spread = config.silhouette, ROBUST, ROUNDS_DEPTH_SPREAD
     for r in range(config.rounds):

@@ -1,9 +1,10 @@
 """Arms whose hand goes where the camera does not see it: behind the back, or before the belly of a person who faces away.
 
 Points alone leave open whether a forearm goes to the front or to the back, and a hand that is not detected leaves even more. But a
-hand that lies before the trunk, or beside the body outside the mask, would be seen. Where the fit has it there for several
-frames, the arm is searched again from the poses in which a hand hides, with a motion as quick as a gesture; skin outside the mask
-costs, and the wrist belongs behind the trunk.
+hand that lies before the trunk, or beside the body outside the mask, would be seen. Where the fit, or the arm as it usually is, has
+it there for several frames, the hand hides: skin outside the mask costs, and the wrist belongs behind the trunk, or to the place on
+it that was found (hidden_search.py). Where the arm may be as usual, the far arm of a side view, nothing hides; points that say
+otherwise are made up.
 T frames, P points, A active joints; sides are 0 left, 1 right.
 """
 
@@ -13,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, J
 from gsac.avatar.wholebody import INDEX as POINT
@@ -30,8 +30,6 @@ TRUNK_JOINTS = [INDEX[name] for name in ("pelvis", "spine1", "spine2", "spine3")
 ELBOW, WRIST = ([int(np.flatnonzero(POINT[f"{side}_{name}"] == BODY_POINTS)[0]) for side in SIDES] for name in ("elbow", "wrist"))
 HAND = [np.flatnonzero((first <= BODY_POINTS) & (first + 21 > BODY_POINTS)) for first in (91, 112)]
 """Rows of `BODY_POINTS`."""
-HIDES = (((52, 15, -85), (28, -71, 0)), ((20, -12, -88), (16, -67, 0)))
-"""Rotation vectors, degrees, of the left shoulder and elbow when the hand lies on the small of the back, and on the belly."""
 ARM_SAMPLES, TRUNK_SAMPLES = 48, 500
 """Points of the surface of a forearm with its hand, and of the trunk, at most."""
 OVER = 0.06
@@ -44,6 +42,14 @@ OUTSIDE, OUTSIDE_SHARE, OUTSIDE_COUNTS = 0.01, 0.1, 0.5
 """An arm is outside the mask if the second, a share of its points, lies farther out than the first, a share of the person's height;
 then it counts so much of a frame with the hand before the trunk: masks miss arms. On three turns and a real one at most 0.09 of an
 arm that the body covers lies outside."""
+HANGS = 0.4
+"""Share of an arm as it usually is that would be seen, in the mean of frames in which its hand is not: below it, the arm may just
+hang there. Of far arms in clean turns at most 0.29, with a hand on the back 0.56 on."""
+NEAR, MOSTLY = np.radians(20), 0.6
+"""An arm mostly rests if shoulder and elbow lie so near their medians in more than this share of frames that show its hand: 0.63 on
+where a right hand goes to the back, 0.47 at most where hands talk, 0.29 where arms are crossed."""
+FACES = 0.4
+"""Share of a trunk's front or back that looks along the view, at least, where it tells how deep a hand on it lies."""
 LEAST_S = 0.25
 """Time in plain view, at least, that contradicts a hand which was not detected; one frame where frames are farther apart."""
 TRUSTED = 0.6
@@ -57,13 +63,8 @@ QUICK, STILL, FREE = 4.0, 0.15, 2.0
 of its pose."""
 ROUGH_DEPTH = 0.2
 """m, spread of the detector's depths of the arm there: it mistakes a hand behind the back for one before the belly."""
-GUESSED = 0.03
-"""Spread, as a share of the person's height, that is added to elbow and wrist of a hidden hand: networks make them up."""
 FAR_OFF = 5.0
 """Factor on the robust limit in the search."""
-RESTLESS = 1.25
-"""Factor on the cost of a search from which on resting costs too much: 1.18 at most with a hand on the back, 1.32 with one that
-talks."""
 STEPS = 12
 """Steps of each search, at most."""
 SIGMA = {"elbow": 0.05, "wrist": 0.1}
@@ -79,8 +80,14 @@ class Stay:
     last: int
     start: int
     stop: int
+    calm: bool = True
+    """Whether the arm mostly rests wherever its hand is seen."""
     rests: bool = True
     """Whether the arm rests while the hand is out of sight."""
+    place: int = 0
+    """Where the hand rests: -1 on the person's back, 1 on the belly; 0: anywhere behind the trunk as the camera sees it."""
+    wider: tuple[int, int] | None = None
+    """First and last frame, exclusive, of the rest, where it began before the hand was lost or went on after; None: the stay's."""
 
     @property
     def around(self) -> slice:
@@ -88,9 +95,20 @@ class Stay:
         return slice(self.start, self.stop)
 
     @property
+    def held(self) -> tuple[int, int]:
+        """First and last frame, exclusive, in which the hand lies where it hides."""
+        return self.wider or (self.first, self.last)
+
+    @property
     def resting(self) -> slice:
-        """The frames out of sight but the first and the last, to and from which the arm goes."""
-        return slice(self.first + 1, self.last - 1)
+        """Those frames but the first and the last, to and from which the arm goes."""
+        return slice(self.held[0] + 1, self.held[1] - 1)
+
+    def shift(self, by: int, frames: int) -> Stay:
+        """The same in frames of a window that begins so many later and has so many."""
+        ends = np.array([self.first, self.last, self.start, self.stop, *self.held])
+        first, last, start, stop, *held = np.clip(ends - by, 0, frames).tolist()
+        return replace(self, first=first, last=last, start=start, stop=stop, wider=(held[0], held[1]))
 
 
 @dataclass
@@ -112,7 +130,8 @@ class HiddenArms:
         return cls(sample_surface(body, weights[:, TRUNK_JOINTS].sum(1) > 0.8, TRUNK_SAMPLES), (left, right), height, [])
 
     def find(self, problem: Problem, state: State, missing: np.ndarray | None) -> None:
-        """Finds the stays: hands that were not detected where the fit has them in plain view.
+        """Finds the stays: hands that were not detected where the fit, or the arm as it usually is, has them in plain view. Where
+        only the fit has, its wrists are made up and do not count.
 
         missing: (T, 2) bool, hands that were not detected; None: all were.
         """
@@ -123,11 +142,20 @@ class HiddenArms:
         least = max(1.0, LEAST_S / float(np.median(np.diff(seconds)))) if len(seconds) > 1 else np.inf
         for side in (0, 1):
             found = []
+            usual = find_usual(state.local[~missing[:, side].astype(bool)][:, ARM_JOINTS[side]])
             for first, last in bridge(missing[:, side]):
                 lost = first + np.flatnonzero(missing[first:last, side])
-                against = sum(self.contradict(problem, state, chain.frame(t), t, side) for t in lost.tolist() if len(lost) >= least)
-                if against >= least:
-                    found.append(Stay(side, first, last, *find_around(seconds, first, last)))
+                if len(lost) < least:
+                    continue
+                against = sum(self.contradict(problem, state, chain.frame(t), t, side) for t in lost.tolist())
+                told, hangs = against >= least, False
+                if usual is not None:
+                    away = self.measure_away(problem, state, lost, side, usual)
+                    hangs, told = bool(away.mean() < HANGS), told or OUTSIDE_COUNTS * away.sum() >= least
+                if hangs and against >= least:
+                    problem.seen.spread[lost, WRIST[side]] = np.inf
+                elif told and not hangs:
+                    found.append(Stay(side, first, last, *find_around(seconds, first, last), usual is not None))
             if found and self.is_detected(state, chain, missing[:, side], side):
                 self.stays += found
 
@@ -140,14 +168,33 @@ class HiddenArms:
     def contradict(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> float:
         """How much it contradicts the fit that the hand is not detected: 1 where it lies before the trunk, less where the arm is
         outside the mask, else 0. chain: of frame t alone."""
-        wrist = chain.place[0, ARM_JOINTS[side, 3]] + state.transl[t]
-        near, _ = self.measure_trunk(state, chain, t, wrist)
-        if wrist[2] < near - BEFORE:
+        if self.is_before(state, chain, t, side):
             return 1.0
+        return OUTSIDE_COUNTS if self.measure_outside(problem, state, chain, t, side) > OUTSIDE_SHARE else 0.0
+
+    def is_before(self, state: State, chain: Chain, t: int, side: int) -> bool:
+        """Whether the wrist lies before the trunk. chain: of frame t alone."""
+        wrist = chain.place[0, ARM_JOINTS[side, 3]] + state.transl[t]
+        return bool(wrist[2] < self.measure_trunk(state, chain, t, wrist)[0] - BEFORE)
+
+    def measure_outside(self, problem: Problem, state: State, chain: Chain, t: int, side: int) -> float:
+        """Share of forearm and hand that lies outside the mask; 0 without one. chain: of frame t alone."""
         x = place_points(chain, self.forearm[side], state.shape)[0] + state.transl[t]
         distance, _, inside = problem.seen.outlines[t].at(problem.project(state, x))
-        outside = problem.seen.outlines[t].area > 0 and (inside & (distance > OUTSIDE * self.height)).mean() > OUTSIDE_SHARE
-        return OUTSIDE_COUNTS if outside else 0.0
+        return float((inside & (distance > OUTSIDE * self.height)).mean()) if problem.seen.outlines[t].area > 0 else 0.0
+
+    def measure_away(self, problem: Problem, state: State, frames: np.ndarray, side: int, usual: np.ndarray) -> np.ndarray:
+        """(F,) shares of an arm that would be seen if it were as usual: outside the mask, or with the hand before the trunk.
+
+        frames: (F,), in which the hand is not detected; usual: (4, 3, 3) rotations of the arm's joints.
+        """
+        local = state.local[frames]
+        local[:, ARM_JOINTS[side]] = usual
+        chain, away = problem.skeleton.pose(local, state.shape), []
+        for i, t in enumerate(frames.tolist()):
+            own = chain.frame(i)
+            away.append(max(self.is_before(state, own, t, side), self.measure_outside(problem, state, own, t, side)))
+        return np.array(away, float)
 
     def measure_trunk(self, state: State, chain: Chain, t: int, place: np.ndarray) -> tuple[float, float]:
         """Depths, m, of the trunk's near and far surface on the line of sight to a place (3,) m; -inf and nan where there is none.
@@ -158,63 +205,14 @@ class HiddenArms:
         on = np.linalg.norm(x[:, :2] / x[:, 2:] - place[:2] / place[2], axis=1) * place[2] < OVER
         return (float(x[on, 2].min()), float(x[on, 2].max())) if on.any() else (-np.inf, np.nan)
 
-    def search(self, problem: Problem, state: State) -> State:
-        """The state with the arms of all stays as they fit best; also loosens their motion and distrusts what was made up."""
-        state = replace(state, local=state.local.copy())
-        for stay in self.stays:
-            frames, arm = slice(stay.first, stay.last), ARM_JOINTS[stay.side]
-            for point, guessed in ((ELBOW[stay.side], GUESSED / 2), (WRIST[stay.side], GUESSED)):
-                problem.seen.spread[frames, point] = np.hypot(problem.seen.spread[frames, point], guessed * self.height)
-            problem.loose[stay.around, np.isin(problem.active, arm)] = QUICK
-            problem.spread[stay.around, np.isin(problem.active, arm)] *= FREE
-            starts = self.list_starts(state, stay)
-            resting, moving = (min((self.fit_arm(problem, state, stay, start, speed) for start in starts), key=lambda fit: fit[0])
-                               for speed in (STILL, QUICK))
-            stay.rests = resting[0] < RESTLESS * moving[0]
-            state.local[stay.around] = (resting if stay.rests else moving)[1]
-        for stay in self.stays:
-            if stay.rests:
-                problem.loose[stay.resting, np.isin(problem.active, ARM_JOINTS[stay.side])] = STILL
-        return state
-
-    def list_starts(self, state: State, stay: Stay) -> list[np.ndarray]:
-        """Joint rotations (F, J, 3, 3) to search from: as they are, and each hiding pose, alone or with the way to it."""
-        out = [asis := state.local[stay.around]]
-        frame = np.arange(stay.start, stay.stop)
-        away = np.maximum(np.maximum(stay.first - frame, frame - stay.last + 1), 0)
-        ramp = np.clip(1 - away / max(away.max(), 1), 0, 1)[:, None, None]
-        joints = ARM_JOINTS[stay.side, 1:3]
-        vector = rotation.log(asis[:, joints])
-        for pose in HIDES:
-            goal = hiding_pose(stay.side, pose)
-            for share in (ramp, np.ones_like(ramp)):
-                start = asis.copy()
-                start[:, joints] = rotation.exp((1 - share) * vector + share * goal)
-                out.append(start)
-        return out
-
-    def fit_arm(self, problem: Problem, state: State, stay: Stay, start: np.ndarray, speed: float) -> tuple[float, np.ndarray]:
-        """Cost and joint rotations (F, J, 3, 3) of the stay's frames after a search in which only this arm moves.
-
-        start: (F, J, 3, 3) joint rotations; speed: factor on the spreads of its motion while the hand is out of sight.
-        """
-        alone = isolate_arm(problem, stay)
-        alone.loose[slice(stay.resting.start - stay.start, stay.resting.stop - stay.start)] = speed
-        hidden, trial = replace(self, stays=[stay]).cut(stay), isolate_state(state, stay, start)
-        for _ in range(2):
-            hidden.hold(alone, trial)
-            trial = bend_arm(alone, trial, STEPS)
-        hidden.hold(alone, trial)
-        return alone.cost(trial), trial.local
-
     def cut(self, window: Stay) -> HiddenArms:
         """The same with the stays of a window's arm alone, in frames of the window."""
-        own = [np.clip(np.array([s.first, s.last, s.start, s.stop]) - window.start, 0, window.stop - window.start).tolist()
-               for s in self.stays if s.side == window.side]
-        return replace(self, stays=[Stay(window.side, *frames) for frames in own])
+        own = [s.shift(window.start, window.stop - window.start) for s in self.stays if s.side == window.side]
+        return replace(self, stays=own)
 
     def hold(self, problem: Problem, state: State) -> None:
-        """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight."""
+        """Tells the problem where hidden arms lie: inside the mask, the wrist behind the trunk on its line of sight, or before it
+        where it rests on what the camera sees of the trunk."""
         problem.inside = [(t, self.forearm[stay.side]) for stay in self.stays for t in range(stay.first, stay.last)
                           if problem.seen.outlines[t].area > 0]
         if not self.stays:
@@ -224,11 +222,13 @@ class HiddenArms:
         hips = problem.locate_points(chain, state)[:, list(problem.hips), 2].mean(1)
         for stay in self.stays:
             spread[stay.around, ELBOW[stay.side]] = spread[stay.around, WRIST[stay.side]] = ROUGH_DEPTH
-            for t in range(stay.first, stay.last):
+            for t in range(*stay.held):
                 own = chain.frame(t)
                 wrist = own.place[0, ARM_JOINTS[stay.side, 3]] + state.transl[t]
-                far = self.measure_trunk(state, own, t, wrist)[1]
-                problem.seen.depth[t, WRIST[stay.side]] = far + SKIN - hips[t]
+                near, far = self.measure_trunk(state, own, t, wrist)
+                away = stay.place * own.world[0, TRUNK_JOINTS[-1], 2, 2] if stay.place else 1.0
+                depth = far + SKIN if away > 0 else near - SKIN
+                problem.seen.depth[t, WRIST[stay.side]] = depth - hips[t] if abs(away) > FACES and np.isfinite(depth) else np.nan
                 spread[t, WRIST[stay.side]] = BEHIND_SPREAD
         problem.seen.depth_spread = spread
 
@@ -249,6 +249,29 @@ class HiddenArms:
         for stay in self.stays:
             out[stay.first:stay.last, stay.side] = True
         return out
+
+    def mark_held(self, frames: int) -> np.ndarray:
+        """(T, 2) bool, frames with a hidden hand, and those beside them in which its arm rests at the same place. frames: T."""
+        out = np.zeros((frames, 2), bool)
+        for stay in self.stays:
+            out[slice(*stay.held), stay.side] = True
+        return out
+
+
+def find_usual(rotations: np.ndarray) -> np.ndarray | None:
+    """(4, 3, 3) rotations of an arm that mostly rests; None where it does not. rotations: (N, 4, 3, 3) of the arm's joints."""
+    if not len(rotations):
+        return None
+    usual = find_median(rotations)
+    trace = np.einsum("nkab,kab->nk", rotations[:, 1:3], usual[1:3])
+    return usual if (np.arccos(np.clip((trace - 1) / 2, -1, 1)).max(1) < NEAR).mean() > MOSTLY else None
+
+
+def find_median(rotations: np.ndarray) -> np.ndarray:
+    """(A, 3, 3) medians of rotations (N, A, 3, 3)."""
+    u, _, v = np.linalg.svd(np.median(rotations, 0))
+    u[..., -1] *= np.linalg.det(u @ v)[..., None]
+    return u @ v
 
 
 def isolate_arm(problem: Problem, stay: Stay) -> Problem:
@@ -299,11 +322,6 @@ def sample_surface(body: Body, part: np.ndarray, most: int) -> Pairs:
     face = np.flatnonzero(part[body.faces].all(1))
     face = face[:: -(-len(face) // most)]
     return make_surface_pairs(body, face, np.full((len(face), 3), 1 / 3))
-
-
-def hiding_pose(side: int, pose: tuple) -> np.ndarray:
-    """Rotation vectors (2, 3) of shoulder and elbow. pose: one of `HIDES`."""
-    return np.radians(np.array(pose, float)) * ([1, 1, 1] if side == 0 else [1, -1, -1])
 
 
 def bridge(missing: np.ndarray, bridged: int = BRIDGED) -> list[tuple[int, int]]:

@@ -49,7 +49,7 @@ def find_mirrored(arms: HiddenArms, problem: Problem, state: State, missing: np.
         return doubtful, local
     chain, some = problem.skeleton.pose(state.local, state.shape), pick_frames(seconds)
     for side in (0, 1):
-        hidden, places = arms.mark(len(missing))[:, side], list_arms(chain, state, side)
+        hidden, places = arms.mark_held(len(missing))[:, side], list_arms(chain, state, side)
         cost = weigh(arms, problem, state, chain, missing[:, side], places[some], side, some)
         cost[hidden[some], 1:] = np.inf
         away = np.linalg.norm(places[some, :, 1:] - places[some, :1, 1:], axis=-1).max(-1)

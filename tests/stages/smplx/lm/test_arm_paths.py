@@ -14,7 +14,8 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm.arm_paths import BARE, THIN, ArmPaths, list_poses
 from gsac.stages.smplx.lm.fit import move_contradicted, set_up
-from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, HAND, HIDES, WRIST, HiddenArms, Stay, hiding_pose, isolate_arm
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, HAND, WRIST, HiddenArms, Stay, isolate_arm
+from gsac.stages.smplx.lm.hidden_search import HIDES, hiding_pose
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.prior import BODY_JOINTS
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person

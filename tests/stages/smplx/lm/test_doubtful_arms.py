@@ -17,7 +17,8 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, find_untold, settle_doubtful, with_stays
 from gsac.stages.smplx.lm.fit import fit_points, set_up
-from gsac.stages.smplx.lm.hidden_arms import HIDES, HiddenArms, Stay, describe_arms, hiding_pose, widen_arm
+from gsac.stages.smplx.lm.hidden_arms import HiddenArms, Stay, describe_arms, widen_arm
+from gsac.stages.smplx.lm.hidden_search import HIDES, hiding_pose
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
 
 FRAMES, ON_BACK = 16, range(5, 11)

@@ -15,9 +15,11 @@ from gsac.avatar.wholebody import LEFT_HAND
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.lm import hidden_arms
+from gsac.stages.smplx.lm import hidden_search
 from gsac.stages.smplx.lm.fit import fit_clip, fit_points, set_up
-from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, QUICK, STILL, HiddenArms, bridge
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, QUICK, STILL, HiddenArms, Stay, bridge, find_usual
+from gsac.stages.smplx.lm.hidden_arms import WRIST as WRIST_ROW
+from gsac.stages.smplx.lm.hidden_search import search_hidden
 from gsac.stages.smplx.silhouette import read_outline
 from gsac.stages.smplx.state import to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
@@ -81,6 +83,58 @@ def test_a_hand_that_the_body_covers_is_not_searched_again(body, tmp_path):
     assert not arms.stays
 
 
+def test_a_far_arm_that_may_hang_as_usual_hides_nothing_and_its_made_up_wrist_does_not_count(body, tmp_path):
+    truth = turning_person(body, 16)
+    seen = sightings_of(body, truth)
+    problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
+    state.local[3:7, ARM_JOINTS[0, 1]] = Rotation.from_euler("y", -90, degrees=True).as_matrix()  # held out before the chest
+    problem.seen.seconds = 0.3 * np.arange(16)
+    missing = np.zeros((16, 2), bool)
+    missing[3:7, 0] = True
+    arms = HiddenArms.of(body, seen.person_height)
+    chain = problem.skeleton.pose(state.local, state.shape)
+    assert arms.contradict(problem, state, chain.frame(5), 5, 0) > 0
+    arms.find(problem, state, missing)
+    assert not arms.stays
+    assert np.isinf(problem.seen.spread[3:7, WRIST_ROW[0]]).all() and np.isfinite(problem.seen.spread[:, WRIST_ROW[1]]).all()
+
+
+def test_a_hand_that_would_be_seen_if_its_arm_hung_as_usual_is_hidden_though_nothing_contradicts_the_fit(body, tmp_path):
+    truth = hide_left_hand(turning_person(body, FRAMES))
+    seen = sightings_of(body, truth)
+    problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
+    arms, missing = HiddenArms.of(body, seen.person_height), np.zeros((FRAMES, 2), bool)
+    missing[HIDDEN, 0] = True
+    state.local[HIDDEN, ARM_JOINTS[0, 1:3]] = Rotation.from_rotvec([[0.8, 0.3, -1.4], [0.5, -1.25, 0]]).as_matrix()
+    chain = problem.skeleton.pose(state.local, state.shape)
+    assert not any(arms.contradict(problem, state, chain.frame(t), t, 0) for t in range(7))
+    arms.find(problem, state, missing)
+    assert [(stay.side, stay.first, stay.last) for stay in arms.stays] == [(0, 0, 7)]
+
+
+def test_a_hand_rests_on_the_back_also_in_frames_that_show_it_there_and_no_longer(body, tmp_path):
+    truth = hide_left_hand(turning_person(body, FRAMES))
+    seen = sightings_of(body, truth)
+    problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
+    arms, missing = HiddenArms.of(body, seen.person_height), np.zeros((FRAMES, 2), bool)
+    missing[:4, 0] = True
+    arms.stays = [Stay(0, 0, 4, 0, FRAMES)]
+    search_hidden(arms, problem, state)
+    (stay,) = arms.stays
+    assert stay.place == -1 and stay.held[0] == 0 and HIDDEN.stop <= stay.held[1] <= HIDDEN.stop + 2
+
+
+def test_the_usual_arm_is_a_rotation_that_a_few_gestures_do_not_move():
+    vectors = np.full((9, 4, 3), 0.3)
+    vectors[:3] = -2.0
+    usual = find_usual(Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(9, 4, 3, 3))
+    assert usual is not None
+    np.testing.assert_allclose(usual, np.tile(Rotation.from_rotvec(vectors[8, 0]).as_matrix(), (4, 1, 1)), atol=1e-9)
+    vectors[3:6] = 1.0
+    assert find_usual(Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(9, 4, 3, 3)) is None
+    assert find_usual(np.zeros((0, 4, 3, 3))) is None
+
+
 @pytest.mark.parametrize("apart, noticed", [(0.3, True), (0.1, False)])
 def test_one_frame_in_plain_view_is_enough_where_frames_are_far_apart(body, tmp_path, apart, noticed):
     truth = hide_left_hand(turning_person(body, FRAMES))
@@ -105,12 +159,12 @@ def test_a_frame_without_a_mask_does_not_break_the_search(body, tmp_path):
     missing[2:6, 0] = True
     arms = HiddenArms.of(body, seen.person_height)
     arms.find(problem, state, missing)
-    assert arms.stays and np.isfinite(arms.search(problem, state).local).all()
+    assert arms.stays and np.isfinite(search_hidden(arms, problem, state).local).all()
 
 
 @pytest.mark.parametrize("restless, factor", [(np.inf, STILL), (0.0, QUICK)])
 def test_an_arm_whose_hand_is_out_of_sight_rests_unless_that_costs_too_much(body, tmp_path, monkeypatch, restless, factor):
-    monkeypatch.setattr(hidden_arms, "RESTLESS", restless)
+    monkeypatch.setattr(hidden_search, "RESTLESS", restless)
     truth = hide_left_hand(turning_person(body, FRAMES))
     seen = misread_left_arm(sightings_of(body, truth))
     problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
@@ -118,7 +172,7 @@ def test_an_arm_whose_hand_is_out_of_sight_rests_unless_that_costs_too_much(body
     missing[HIDDEN, 0] = True
     arms = HiddenArms.of(body, seen.person_height)
     arms.find(problem, state, missing)
-    arms.search(problem, state)
+    search_hidden(arms, problem, state)
     (stay,) = arms.stays
     left, right = (np.isin(problem.active, joints) for joints in ARM_JOINTS)
     assert stay.rests == (factor == STILL) and (stay.resting.start, stay.resting.stop) == (stay.first + 1, stay.last - 1)
