@@ -91,12 +91,12 @@ def see(posed: np.ndarray, faces: np.ndarray) -> Bent:
     return Bent(posed, sides)
 
 
-def find_stray(gaussians: Gaussians, sides: list[Side], faces: np.ndarray, workspace: Workspace, off: float = OFF) -> np.ndarray:
-    """(N,) alpha that each gaussian adds off the silhouettes, over their area, sum over the sides. faces: (F, 3); off: as `OFF`.
+def find_stray(gaussians: Gaussians, sides: list[Side], faces: np.ndarray, workspace: Workspace) -> np.ndarray:
+    """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, sum over the sides. faces: (F, 3).
 
     What it adds is the gradient of a sum of pixels by its colour.
     """
-    stray, off = np.zeros(len(gaussians)), off * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
+    stray, off = np.zeros(len(gaussians)), OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
     for side in sides:
         counted = np.clip(side.away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
         rendering = render_bound(side.vertices, faces, gaussians, side.camera, workspace)
