@@ -4,7 +4,6 @@ constexpr int REACH = 5, WIDE = TILE + 2 * REACH;
 // Row lengths in shared memory: lanes that take one row each, 16 bytes at a time, meet no bank twice.
 constexpr int PITCH = 28, BLURRED = 20;
 constexpr float C1 = 1e-4f, C2 = 9e-4f;
-constexpr float SOFT = 0.1f;  // of the mask's term, as `stages/train/gaussians/kernels.py` tells
 // 11-tap gaussian, sigma 1.5
 __device__ constexpr float WINDOW[11] = {0.00102838f, 0.00759876f, 0.03600077f, 0.10936069f, 0.21300554f, 0.26601172f,
                                          0.21300554f, 0.10936069f, 0.03600077f, 0.00759876f, 0.00102838f};
@@ -52,9 +51,6 @@ FORMULA Pixel pixel_of(const Scene &s, const Place &p, int x, int y) {
                   true_pixel.z * byte + clear_target * now.background[2]};
     return out;
 }
-
-// Size of a difference between alpha and mask, rounded off at zero.
-FORMULA float size_of(float difference) { return sqrtf(difference * difference + SOFT * SOFT); }
 
 // Weight of a channel of a pixel in the mean that the losses are.
 FORMULA float share_of(const Scene &s, const Place &p) { return 1 / (3 * (s.area > 0 ? s.area : float(p.width) * p.height)); }
@@ -121,7 +117,7 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
                 if (r >= REACH && c >= REACH && r < REACH + TILE && c < REACH + TILE) {
                     float dx = pixel.image.x - pixel.target.x, dy = pixel.image.y - pixel.target.y;
                     float dz = pixel.image.z - pixel.target.z, da = pixel.alpha - pixel.mask;
-                    loss += share * (dx * dx + dy * dy + dz * dz) + 3 * share * s.mask * (size_of(da) - SOFT);
+                    loss += share * (dx * dx + dy * dy + dz * dz) + 3 * share * s.mask * da * da;
                     shown += pixel.alpha;
                     masked += pixel.mask;
                     both += pixel.alpha * pixel.mask;
@@ -346,8 +342,7 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
                 for (int k = 0; k < 3; ++k)
                     lpips[k] = s.perceptual * s.window_slope[3 * ((size_t(p.b) * s.window_height + wy) * s.window_width + wx) + k];
         }
-        const float beside = pixel.alpha - pixel.mask;
-        float4 out = {0, 0, 0, 3 * share * s.mask * beside / size_of(beside)};
+        float4 out = {0, 0, 0, 6 * share * s.mask * (pixel.alpha - pixel.mask)};
         if (s.dice_weight > 0) out.w += s.dice[0] * (1 - pixel.mask);
         for (int k = 0; k < 3; ++k) {
             grad[k] = seen * (grad[k] + 2 * share * (image[k] - target[k])) + lpips[k] + sobel[k];

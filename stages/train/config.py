@@ -120,8 +120,8 @@ class TrainConfig:
     """Weight of 1 - SSIM beside L2."""
     sobel: float = 0.0
     """Weight of the Sobel term beside L2."""
-    mask: float = 0.5
-    """Weight of the mean difference between the avatar's alpha and the mask, squared only where it is small."""
+    mask: float = 0.3
+    """Weight of the L2 between the avatar's alpha and the mask."""
     needle: float = 4.0
     """Largest ratio of a gaussian's longest axis to its middle one."""
     largest: float = 0.025

@@ -34,7 +34,6 @@ from gsac.stages.train.finite import named_gradients, named_pose, require_finite
 from gsac.stages.train.gaussians.barely_seen import hold_barely_seen
 from gsac.stages.train.gaussians.cloth_offsets import Offsets, fold
 from gsac.stages.train.gaussians.first_colours import fill_unseen
-from gsac.stages.train.gaussians.fringes import trim_fringes
 from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.gaussians.unseen import find_seen, flatten_unseen, front_pixels, level_heights
 from gsac.stages.train.poses.guessed_limbs import find_guessed_faces
@@ -187,13 +186,12 @@ class Trainer:
         self.poses.offset, self.offsets = np.zeros_like(self.poses.offset), None
 
     def lay_unseen(self, views: dict[int, View]) -> None:
-        """Lays gaussians that no frame shows flat among their neighbours and freezes them; levels heights, trims fringes.
+        """Lays gaussians that no frame shows flat among their neighbours and freezes them; levels the heights of all.
 
         views: frame -> view at half the size.
         """
         gaussians = self.freeze_unseen(views)
         gaussians = level_heights(flatten_unseen(gaussians, self.seen, self.rest, self.faces), self.rest, self.faces)
-        gaussians = trim_fringes(gaussians, self.poses, np.array(list(views)))
         self.values |= {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
                         "opacity_logit": opacity_logit(gaussians.opacity)[:, None].astype(np.float32)}
         self.start = gaussians.mu.copy()

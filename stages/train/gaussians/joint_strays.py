@@ -106,12 +106,12 @@ def place(posed: np.ndarray, faces: np.ndarray) -> Placed:
     return Placed(face_frames(posed, faces), KDTree(posed))
 
 
-def find_stray(gaussians: Gaussians, side: Side, faces: np.ndarray, workspace: Workspace, off: float = OFF) -> np.ndarray:
-    """(N,) alpha that each gaussian adds off the silhouette, over its area, seen from a side. faces: (F, 3); off: as `OFF`.
+def find_stray(gaussians: Gaussians, side: Side, faces: np.ndarray, workspace: Workspace) -> np.ndarray:
+    """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, seen from a side. faces: (F, 3).
 
     What it adds is the gradient of a sum of pixels by its colour.
     """
-    off = off * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
+    off = OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
     counted = np.clip(side.away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
     rendering = render_bound(side.vertices, faces, gaussians, side.camera, workspace)
     return render_backward(rendering.state, counted, np.zeros_like(rendering.alpha)).rgb[:, 0] / side.area

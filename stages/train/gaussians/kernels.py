@@ -9,10 +9,6 @@ import numpy as np
 from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import Share
 
-SOFT = 0.1
-"""Difference of alpha and mask from which on it counts by its size, no longer by its square: frames disagree about the outline, and
-squares would draw their mean, a soft edge. The same as in `avatar/cuda/image.cuh`."""
-
 
 def on_background(share: Share, rgb: np.ndarray, alpha: np.ndarray, pixels: np.ndarray, background: np.ndarray, gain: np.ndarray,
                   image: np.ndarray, target: np.ndarray, spans: np.ndarray) -> None:
@@ -27,7 +23,7 @@ def on_background(share: Share, rgb: np.ndarray, alpha: np.ndarray, pixels: np.n
 def through_background(share: Share, grad_image: np.ndarray, rgb: np.ndarray, alpha: np.ndarray, pixels: np.ndarray,
                        background: np.ndarray, gain: np.ndarray, mask_weight: float, grad_rgb: np.ndarray, grad_alpha: np.ndarray,
                        grad_gain: np.ndarray) -> float:
-    """Backward pass of `on_background` plus mask_weight * mean(sqrt((alpha - mask)^2 + SOFT^2) - SOFT), whose value it returns.
+    """Backward pass of `on_background` plus mask_weight * mean((alpha - mask)^2), whose value it returns.
 
     share: `Workspace.share`; grad_image: (h, w, 3); rgb: (h, w, 3) premultiplied; alpha: (h, w); pixels: (h, w, 4) uint8
     premultiplied; background, gain: (3,). grad_rgb (h, w, 3), grad_alpha (h, w) and grad_gain (3,) are written.
@@ -62,15 +58,14 @@ def _on_background(worker, workers, rgb, alpha, pixels, background, gain, image,
 def _through_background(worker, workers, grad_image, rgb, alpha, pixels, background, gain, mask_weight, grad_rgb, grad_alpha, sums):
     """sums: (h, 4), of each row the mask's term and the gain's gradient."""
     byte = rgb.dtype.type(1 / 255)
-    share, soft = rgb.dtype.type(mask_weight / alpha.size), rgb.dtype.type(SOFT)
+    share = rgb.dtype.type(mask_weight / alpha.size)
     height = rgb.shape[0]
     for y in range(height * worker // workers, height * (worker + 1) // workers):
         term, red, green, blue = 0.0, 0.0, 0.0, 0.0
         for x in range(rgb.shape[1]):
             difference = alpha[y, x] - pixels[y, x, 3] * byte
-            size = math.sqrt(difference * difference + soft * soft)
-            term += share * (size - soft)
-            g = share * difference / size
+            term += share * difference * difference
+            g = 2 * share * difference
             for c in range(3):
                 g -= grad_image[y, x, c] * background[c]
                 grad_rgb[y, x, c] = grad_image[y, x, c] * gain[c]
