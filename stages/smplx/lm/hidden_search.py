@@ -58,7 +58,7 @@ def search_hidden(arms: HiddenArms, problem: Problem, state: State) -> State:
         ways = {place: list_ways(asis, stay, pose) for place, pose in HIDES.items()}
         starts = [asis, *ways[BACK], *ways[BELLY]]
         cost, local = fit_best(arms, problem, state, stay, starts, QUICK)
-        placed = stay
+        placed, least, resting = stay, np.inf, asis
         if stay.calm:
             tries = [rest(arms, problem, state, replace(stay, place=place), [asis, *own]) for place, own in ways.items()]
             placed, least, resting = min(tries, key=lambda found: found[1] - TELLS * np.ptp(found[0].held))
