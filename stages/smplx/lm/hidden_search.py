@@ -31,7 +31,8 @@ from gsac.stages.smplx.lm.hidden_arms import (
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.state import State
 
-HIDES = {-1: ((52, 15, -85), (28, -71, 0)), 1: ((20, -12, -88), (16, -67, 0))}
+BACK, BELLY = -1, 1
+HIDES = {BACK: ((52, 15, -85), (28, -71, 0)), BELLY: ((20, -12, -88), (16, -67, 0))}
 """Place of a stay -> rotation vectors, degrees, of the left shoulder and elbow: hand on the small of the back, and on the belly."""
 GUESSED = 0.03
 """Spread, as a share of the person's height, that is added to elbow and wrist of a hidden hand: networks make them up."""
@@ -55,17 +56,18 @@ def search_hidden(arms: HiddenArms, problem: Problem, state: State) -> State:
         problem.spread[stay.around, np.isin(problem.active, arm)] *= FREE
         asis = state.local[stay.around]
         ways = {place: list_ways(asis, stay, pose) for place, pose in HIDES.items()}
-        starts = [asis, *ways[-1], *ways[1]]
+        starts = [asis, *ways[BACK], *ways[BELLY]]
         cost, local = fit_best(arms, problem, state, stay, starts, QUICK)
+        placed, least, resting = stay, np.inf, asis
         if stay.calm:
             tries = [rest(arms, problem, state, replace(stay, place=place), [asis, *own]) for place, own in ways.items()]
             placed, least, resting = min(tries, key=lambda found: found[1] - TELLS * np.ptp(found[0].held))
-        else:
+        if placed.place != BACK:  # before the belly a hand is detected wherever the camera sees it: it is behind the trunk
             placed, (least, resting) = stay, fit_best(arms, problem, state, stay, starts, STILL)
         stay.rests = bool(least < RESTLESS * cost)
         if stay.rests:
             stay.place, stay.wider, local = placed.place, placed.wider, resting
-        if stay.rests and stay.calm:
+        if stay.rests and stay.place == BACK:
             start = resting.copy()
             start[stay.held[0] - stay.start:stay.held[1] - stay.start, arm] = find_pose(resting, stay)
             _, local = fit_best(arms, problem, state, stay, [start], STILL)
