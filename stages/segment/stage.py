@@ -108,7 +108,8 @@ def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], cl
     frames = job.inputs["split/frames"]
     network = METHODS[job.config.method](job.models)
     sapiens = network if isinstance(network, Sapiens) else None
-    regions = [person_region(np.nan_to_num(xy), score) for xy, score in zip(keypoints["xy"], keypoints["score"], strict=True)]
+    regions = {t: region for t, (xy, score) in enumerate(zip(keypoints["xy"], keypoints["score"], strict=True))
+               if (region := person_region(np.nan_to_num(xy), score)) is not None}
     found: dict[int, np.ndarray] = {}
 
     def look(t: int, image: np.ndarray) -> np.ndarray:
@@ -122,15 +123,14 @@ def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], cl
         image = read_frame(frames / "plate.png")
         plate = Plate(image, np.ones(image.shape[:2], bool))
     elif learns and sapiens is None:
-        shown = np.array([region is not None for region in regions])
-        plate = learn_plate(paths, shown, lambda t, image: look(t, image) > LEAST)
+        plate = learn_plate(paths, np.isin(np.arange(len(paths)), list(regions)), lambda t, image: look(t, image) > LEAST)
     absent, unfound, fits = np.zeros((3, len(paths)), bool)
     cutouts: dict[int, Cutout] = {}
 
     def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]]:
         """Index, image, probability and labels of each frame; the network has threads of its own, so one thread feeds it."""
         for t, image in enumerate(prefetch(pool, read_frame, paths, 2)):
-            if regions[t] is None:
+            if t not in regions:
                 yield t, image, None, None
             elif sapiens is not None:
                 yield t, image, *sapiens.read(image)

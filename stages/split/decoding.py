@@ -50,7 +50,7 @@ class Chains:
         for pick in picks[-2:0:-1]:  # from the end: what a later frame's chain holds costs the earlier ones nothing
             away = np.abs(times - times[pick])
             near = np.flatnonzero(away <= reach)
-            more = [max(0, self.length[k] - decoded.get(int(self.root[k]), 0)) for k in near]
+            more = np.array([max(0, self.length[k] - decoded.get(int(self.root[k]), 0)) for k in near])
             best = near[np.lexsort((away[near], more))[0]]
             decoded[int(self.root[best])] = max(int(self.length[best]), decoded.get(int(self.root[best]), 0))
             moved.append(best)

@@ -143,14 +143,14 @@ def _first_picture(container: InputContainer, stream: av.VideoStream, path: Path
 def _packet_times(path: Path, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(N,) rising ticks of the intact packets of one stream, (K,) of its key frames, and (N,) when each is decoded; the first two
     are empty if any has no time, the last if it is not told."""
-    ticks, keys, sent = [], [], []
+    ticks, keys, sent, none = [], [], [], np.zeros(0, np.int64)
     with open_video(path) as container:
         try:
             for packet in container.demux(container.streams[index]):
                 if packet.size == 0 or packet.is_discard or packet.is_corrupt:
                     continue
                 if packet.pts is None:
-                    return (np.zeros(0, np.int64),) * 3
+                    return none, none, none
                 ticks.append(packet.pts)
                 sent.append(packet.dts)
                 keys += [packet.pts] * packet.is_keyframe

@@ -3,6 +3,7 @@
 import subprocess
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import imageio_ffmpeg
 import numpy as np
@@ -16,6 +17,7 @@ from gsac.stages.split import video
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.decoding import NEAR, Chains
 from gsac.stages.split.pick import pick_by_time
+from gsac.stages.split.probe import Video
 from gsac.stages.split.stage import run
 
 ENCODERS = {
@@ -92,7 +94,14 @@ def test_a_damaged_video_is_told_as_if_all_of_it_were_decoded(tmp_path, monkeypa
 def phone(frames: int, every: int) -> Chains:
     """Of a clip with a key frame `every` so many."""
     ticks = np.arange(frames)
-    return Chains.of(SimpleNamespace(ticks=ticks, sent=ticks, key_ticks=ticks[::every]))
+    chains = chains_of(ticks, ticks, ticks[::every])
+    assert chains is not None
+    return chains
+
+
+def chains_of(ticks: np.ndarray, sent: np.ndarray, keys: np.ndarray) -> Chains | None:
+    """As of a video of these times."""
+    return Chains.of(cast(Video, SimpleNamespace(ticks=ticks, sent=sent, key_ticks=keys)))
 
 
 @settings(deadline=None)
@@ -116,5 +125,5 @@ def test_twenty_seconds_of_a_phone_are_seen_evenly_by_three_fifths_of_their_fram
 
 def test_without_times_of_decoding_all_is_decoded():
     ticks = np.arange(9)
-    assert Chains.of(SimpleNamespace(ticks=ticks, sent=ticks[:0], key_ticks=ticks[:1])) is None
-    assert Chains.of(SimpleNamespace(ticks=ticks, sent=ticks, key_ticks=ticks[3:4])) is None
+    assert chains_of(ticks, ticks[:0], ticks[:1]) is None
+    assert chains_of(ticks, ticks, ticks[3:4]) is None
