@@ -87,7 +87,7 @@ def _keep_zeros(rows, at, planes, plane, step, count):
 
 
 @kernel
-def _sum(row, at, count):
+def _sum_of(row, at, count):
     """Sum of `count` numbers of a row from `at` on."""
     value = spread(row.dtype.type(0))
     for i in range(0, count, WIDTH):
@@ -177,7 +177,7 @@ def similarity(worker, workers, image, target, pitch, start, height, count, shar
             share_row = shares[min(max(middle, 0), len(shares) - 1)]
             if seen < row - 2 * REACH:
                 if begin <= middle < end:
-                    sums[middle, first // STRIP] = _sum(share_row, MARGIN + first, narrow)
+                    sums[middle, first // STRIP] = _sum_of(share_row, MARGIN + first, narrow)
             elif 0 <= middle < height:
                 value = zero
                 window = means + (middle - REACH + 2 * ROWS) % ROWS * WIDE

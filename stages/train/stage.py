@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -321,7 +321,8 @@ class Run:
                                    {t: view.reduced(trained.height) for t, view in self.filmed.items()})
             bending = aside.submit(judge_novel, gaussians, poses)
             if self.job.device == "cpu":
-                wait([judging, comparing, looking, bending])  # twice as many frames at once would take twice the memory
+                beside: list[Future[Any]] = [judging, comparing, looking, bending]
+                wait(beside)  # twice as many frames at once would take twice the memory
             if config.pose_test_steps:
                 ttpo, small_ttpo = self.judge_aligned(gaussians, aligned, small)
             self.job.progress(1, *JUDGING)
