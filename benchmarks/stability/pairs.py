@@ -34,12 +34,11 @@ def find_pairs(trials: Iterable[Trial]) -> list[Pair]:
     out = []
     for (clip, fault, severity, seed, method), ours in found.items():
         theirs = found.get((clip, fault, severity, seed, PAPER))
-        cleans = [clean.get((clip, name)) for name in (DEFAULT, PAPER)]
-        if method != DEFAULT or theirs is None or cleans[0] is None or cleans[1] is None:
+        own, other = clean.get((clip, DEFAULT)), clean.get((clip, PAPER))
+        if method != DEFAULT or theirs is None or own is None or other is None:
             continue
-        best = max(cleans, key=_quality)
-        out.append(Pair(fault, severity, retain(ours, cleans[0]) - retain(theirs, cleans[1]),
-                        retain(ours, best) - retain(theirs, best)))
+        best = max(own, other, key=_quality)
+        out.append(Pair(fault, severity, retain(ours, own) - retain(theirs, other), retain(ours, best) - retain(theirs, best)))
     return out
 
 

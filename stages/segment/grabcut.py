@@ -39,11 +39,11 @@ def cut_out(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: n
         labels[difference.changed] = cv2.GC_FGD
     foreground = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
     if iterations and foreground.any() and not foreground.all():
-        colours = np.zeros((2, 1, 65))
+        background, person, everywhere = np.zeros((1, 65)), np.zeros((1, 65)), (0, 0, *size)  # the last is not looked at
         few = np.s_[::SOME, ::SOME] if min(foreground.sum(), (~foreground).sum()) > SMALL else np.s_[:, :]
         cv2.setRNGSeed(0)  # k-means inside draws numbers: the same frame must give the same bytes
-        cv2.grabCut(small[few].copy(), labels[few].copy(), None, *colours, 0, cv2.GC_INIT_WITH_MASK)
-        cv2.grabCut(small, labels, None, *colours, iterations, cv2.GC_EVAL)
+        cv2.grabCut(small[few].copy(), labels[few].copy(), everywhere, background, person, 0, cv2.GC_INIT_WITH_MASK)
+        cv2.grabCut(small, labels, everywhere, background, person, iterations, cv2.GC_EVAL)
         foreground = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
     return cv2.resize(foreground.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
 
