@@ -11,7 +11,7 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.zbuffer import rasterise
-from gsac.benchmarks import training
+from gsac.benchmarks import as_filmed, training
 from gsac.benchmarks.command import names
 from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart
@@ -121,14 +121,20 @@ def test_joints_are_moved_onto_the_rays_of_the_truth():
     assert novel_poses.solve_translation(small - shift, truth) == pytest.approx(shift, abs=1e-9), "nearer and smaller looks alike"
 
 
-def test_a_floater_is_stray_and_a_missing_limb_a_hole_in_the_true_outline():
+@pytest.fixture
+def standing():
+    """A plain avatar of 6,000 gaussians, its pose, and a view in which the person is white."""
     body = Body.load()
     params = BodyParams.from_pose(np.array([[[np.pi, 0, 0], *np.zeros((54, 3))]]), np.array([[0, 0, 4.0]]), np.zeros(4),
                                   np.zeros((1, body.exprdirs.shape[2])), 300.0, (110.0, 110.0))
     poses, camera = Poses(body, params), params.camera(220, 220)
     mask = np.uint8(255 * (rasterise(poses.vertices(0), body.faces, camera)[0] >= 0))
-    views = [View(camera, np.dstack([mask] * 4), (0, 0))]
-    gaussians = Gaussians.area(body.v_template, body.faces, 6000)
+    return Gaussians.area(body.v_template, body.faces, 6000), poses, [View(camera, np.dstack([mask] * 4), (0, 0))]
+
+
+def test_a_floater_is_stray_and_a_missing_limb_a_hole_in_the_true_outline(standing):
+    gaussians, poses, views = standing
+    body = poses.body
     clean = novel_poses.judge_outline(gaussians, poses, views)
     assert clean["stray"] < 0.06 and clean["holes"] < 0.03
     places = body.v_template[body.faces[gaussians.face, 0]]
@@ -137,6 +143,15 @@ def test_a_floater_is_stray_and_a_missing_limb_a_hole_in_the_true_outline():
     gaussians.mu[0, 1] -= 0.5 / face_frames(body.v_template, body.faces).k[gaussians.face[0]]
     gaussians.log_scale[0] += 2
     assert novel_poses.judge_outline(gaussians, poses, views)["stray"] > clean["stray"] + 0.001
+
+
+def test_an_avatar_that_is_wider_than_its_mask_errs_more_about_the_outline_and_strays_farther(standing):
+    gaussians, poses, views = standing
+    shown = dict(enumerate(views))
+    clean = as_filmed.judge_edge(gaussians, poses, shown)
+    gaussians.log_scale += 0.7
+    wide = as_filmed.judge_edge(gaussians, poses, shown)
+    assert wide["stray_edge"] > 2 * clean["stray_edge"] and wide["edge_error"] > clean["edge_error"]
 
 
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):
