@@ -15,14 +15,13 @@ class Body(torch.nn.Module):
     """Betas, and of each frame a pose, a place and an expression, as parameters of their own: Adam passes over those without a
     gradient."""
 
-    template: torch.Tensor
-    """As in `Scene`, like those that follow."""
-    shapedirs: torch.Tensor
-    exprdirs: torch.Tensor
-    joints: torch.Tensor
-    joint_dirs: torch.Tensor
-    weights: torch.Tensor
-    jaw_actions: torch.Tensor
+    template: torch.Tensor  # (V, 3) m
+    shapedirs: torch.Tensor  # (V, 3, B)
+    exprdirs: torch.Tensor  # (V, 3, E)
+    joints: torch.Tensor  # (J, 3) m
+    joint_dirs: torch.Tensor  # (J, 3, B)
+    weights: torch.Tensor  # (V, J)
+    jaw_actions: torch.Tensor  # (E, 3)
 
     def __init__(self, scene: Scene):
         super().__init__()

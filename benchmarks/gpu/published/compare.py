@@ -30,7 +30,11 @@ def made_splats(count: int = 60) -> tuple[list[torch.Tensor], list[torch.Tensor]
 
 def drawn_with_gradients(parts: list[torch.Tensor], background: torch.Tensor, by_image: torch.Tensor, by_alpha: torch.Tensor,
                          exact: bool) -> list[torch.Tensor]:
-    """`SHOWN`: image and alpha, and the gradients of made splats."""
+    """`SHOWN`: image (B, h, w, 3) and alpha (B, h, w), and the gradients of made splats, of the parts' shapes.
+
+    parts: places and others of `made_splats`, (B, N, 3) first; background: (B, 3); by_image: (B, h, w, 3); by_alpha: (B, h, w),
+    weights of the pixels in what is differentiated.
+    """
     places, quats, scales, rgb, shift = leaves = [part.clone().requires_grad_() for part in parts]
     lens = background.new_tensor([[FOCAL, FOCAL], [WIDTH / 2, HEIGHT / 2]]).expand(FRAMES, 2, 2)
     sheet = Sheet(WIDTH, HEIGHT, background, OPACITY, exact)
@@ -98,5 +102,5 @@ def grads_of(parameters: torch.nn.ParameterList, frames: list[int]) -> torch.Ten
 
 
 def apart_of(found: np.ndarray | torch.Tensor, expected: np.ndarray | torch.Tensor) -> float:
-    """Norm of the difference over that of `expected`."""
+    """Norm of the difference over that of `expected`. found, expected: (...)."""
     return float(np.linalg.norm(np.asarray(found) - np.asarray(expected)) / np.linalg.norm(np.asarray(expected)))

@@ -26,14 +26,14 @@ def on_background(rgb: torch.Tensor, alpha: torch.Tensor, background: torch.Tens
 
 
 def convolve(images: torch.Tensor, kernel: torch.Tensor) -> torch.Tensor:
-    """(B, C, S, S): every channel of (B, C, S, S) under kernel (h, w), zeros around."""
+    """(B, C, S, S): every channel of images (B, C, S, S) under kernel (h, w), zeros around."""
     flat = images.flatten(0, 1)[:, None]
     padding = kernel.shape[0] // 2, kernel.shape[1] // 2
     return functional.conv2d(flat, kernel.to(images)[None, None], padding=padding).reshape(images.shape)
 
 
 def blur(images: torch.Tensor) -> torch.Tensor:
-    """(B, C, S, S) under SSIM's window of sigma 1.5, which is a product of one across and one down."""
+    """images (B, C, S, S) under SSIM's window of sigma 1.5, which is a product of one across and one down."""
     places = torch.arange(SPAN, dtype=torch.float64) - SPAN // 2
     window = torch.exp(-places**2 / (2 * 1.5**2))
     window = window / window.sum()
@@ -41,7 +41,7 @@ def blur(images: torch.Tensor) -> torch.Tensor:
 
 
 def ssim(one: torch.Tensor, other: torch.Tensor) -> torch.Tensor:
-    """Mean structural similarity of (B, S, S, 3) and (B, S, S, 3)."""
+    """Mean structural similarity. one, other: (B, S, S, 3)."""
     x, y = one.permute(0, 3, 1, 2), other.permute(0, 3, 1, 2)
     mean_x, mean_y = blur(x), blur(y)
     var_x, var_y = blur(x * x) - mean_x**2, blur(y * y) - mean_y**2
@@ -51,7 +51,7 @@ def ssim(one: torch.Tensor, other: torch.Tensor) -> torch.Tensor:
 
 
 def strength(images: torch.Tensor) -> torch.Tensor:
-    """(B, 1, S, S) of (B, S, S, 3): root of the squared central differences of the grey image."""
+    """(B, 1, S, S) of images (B, S, S, 3): root of the squared central differences of the grey image."""
     grey = (images * GREY.to(images)).sum(-1)[:, None]
     across = convolve(grey, torch.tensor([[-1.0, 0, 1]]))
     down = convolve(grey, torch.tensor([[-1.0], [0], [1]]))
@@ -59,7 +59,7 @@ def strength(images: torch.Tensor) -> torch.Tensor:
 
 
 def sobel(images: torch.Tensor) -> torch.Tensor:
-    """(2, B, 3, S, S) of (B, S, S, 3): Sobel's operator across and down."""
+    """(2, B, 3, S, S) of images (B, S, S, 3): Sobel's operator across and down."""
     across = torch.tensor([[-1.0, 0, 1], [-2, 0, 2], [-1, 0, 1]])
     return torch.stack([convolve(images.permute(0, 3, 1, 2), kernel) for kernel in (across, across.T)])
 
@@ -72,7 +72,7 @@ def dice(alpha: torch.Tensor, mask: torch.Tensor, outside: int = 0) -> torch.Ten
 
 
 def seen_losses(image: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
-    """L2 and SSIM of images (B, S, S, 3)."""
+    """L2 and SSIM. image, target: (B, S, S, 3)."""
     return functional.mse_loss(image, target) + SSIM * (1 - ssim(image, target))
 
 
@@ -91,7 +91,7 @@ def code_losses(image: torch.Tensor, target: torch.Tensor, alpha: torch.Tensor, 
 
 
 def text_losses(image: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
-    """As `code_losses`, by the paper's text."""
+    """A scalar as `code_losses`, by the paper's text. image, target: (B, S, S, 3)."""
     return seen_losses(image, target) + SOBEL * ((sobel(image) - sobel(target)) ** 2).sum(0).mean()
 
 
@@ -113,7 +113,7 @@ def face_frames(vertices: torch.Tensor, faces: torch.Tensor) -> tuple[torch.Tens
 
 
 def quaternion(matrix: torch.Tensor) -> torch.Tensor:
-    """(..., 4) wxyz of rotations (..., 3, 3), by the largest of its four numbers."""
+    """(..., 4) wxyz of a rotation's matrix (..., 3, 3), by the largest of its four numbers."""
     m = matrix
     trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
     squares = torch.stack([1 + trace, *(1 - trace + 2 * m[..., c, c] for c in range(3))], -1)  # 4 w^2, 4 x^2, ...
@@ -135,7 +135,7 @@ def multiply(p: torch.Tensor, q: torch.Tensor) -> torch.Tensor:
 
 
 def turn_of(quats: torch.Tensor) -> torch.Tensor:
-    """Rotations (..., 3, 3) of quaternions (..., 4) wxyz of length one."""
+    """Rotations (..., 3, 3) of quats (..., 4) wxyz of length one."""
     w, x, y, z = quats.unbind(-1)
     return torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
                         2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
@@ -186,7 +186,7 @@ def note(total: torch.Tensor, times: torch.Tensor, gradient: torch.Tensor, radiu
 
 
 def selected(total: torch.Tensor, times: torch.Tensor) -> torch.Tensor:
-    """(N,) bool, which gaussians an event takes, from the sums (N,) and (N,)."""
+    """(N,) bool, which gaussians an event takes. total, times: (N,), the sums of `note`."""
     return torch.nan_to_num(total / times) >= THRESHOLD
 
 
@@ -235,11 +235,13 @@ def splats(places: torch.Tensor, quats: torch.Tensor, scales: torch.Tensor, foca
     return middle, half @ half.transpose(-1, -2) + 0.3 * torch.eye(2).to(places)
 
 
-def draw(places, quats, scales, rgb, opacity, focal, centre, size, shift=0.0, most=0.99):
+def draw(places: torch.Tensor, quats: torch.Tensor, scales: torch.Tensor, rgb: torch.Tensor, opacity: float | torch.Tensor,
+         focal: torch.Tensor, centre: torch.Tensor, size: tuple[int, int], shift: float | torch.Tensor = 0.0,
+         most: float = 0.99) -> tuple[torch.Tensor, torch.Tensor]:
     """Premultiplied rgb (h, w, 3) and alpha (h, w) of posed gaussians, as 3DGS splats them; gradients are exact.
 
-    As `splats`, of one frame; rgb: (N, 3); size: width and height, px; shift: (N, 2) px, added to the splats' places; most: alpha
-    at most.
+    places, scales: (N, 3) m, quats: (N, 4) and focal, centre: (2,) px, as of `splats`, of one frame; rgb: (N, 3); opacity: scalar;
+    size: width and height, px; shift: (N, 2) px, added to the splats' places; most: alpha at most.
     """
     order = places[:, 2].detach().argsort(stable=True)
     middle, covariance = splats(places, quats, scales, focal, centre)

@@ -12,7 +12,7 @@ from gsac.benchmarks.gpu.published.tiles import LEAST, MOST, STOP, TILE, Lists, 
 
 
 def composite(pairs: torch.Tensor, lists: Lists, sheet: Sheet) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """As `splats.composite`."""
+    """As `splats.composite`: (B, h, w, 3), (B, h, w) and (B, h, w) of pairs (PAIR, P)."""
     shape = len(sheet.background), sheet.height, sheet.width
     colour, left = pairs.new_empty(*shape, 3), pairs.new_empty(shape)
     last = torch.empty(shape, dtype=torch.int32, device=pairs.device)
@@ -24,7 +24,10 @@ def composite(pairs: torch.Tensor, lists: Lists, sheet: Sheet) -> tuple[torch.Te
 
 def composite_back(pairs: torch.Tensor, left: torch.Tensor, last: torch.Tensor, grad_image: torch.Tensor, grad_alpha: torch.Tensor,
                    behind: torch.Tensor, lists: Lists, sheet: Sheet) -> torch.Tensor:
-    """As `splats.composite_back`."""
+    """As `splats.composite_back`: (PAIR, P) of pairs (PAIR, P).
+
+    left, last, grad_alpha, behind: (B, h, w); grad_image: (B, h, w, 3).
+    """
     out = torch.zeros_like(pairs)
     _composite_back[(len(lists.start) - 1,)](pairs, lists.start, left, last, grad_image, grad_alpha, behind.contiguous(), out,
                                              pairs.shape[1], lists.columns, lists.rows, sheet.width, sheet.height, sheet.opacity,
@@ -116,7 +119,7 @@ def _composite_back(pairs, start, left, last, grad_image, grad_alpha, behind, ou
 
 
 def nearest(places: torch.Tensor) -> torch.Tensor:
-    """As `formulas.nearest`."""
+    """(N, 3) int64 as `formulas.nearest`. places: (N, 3)."""
     out = torch.empty(len(places), 3, dtype=torch.int32, device=places.device)
     block = 32
     _nearest[(triton.cdiv(len(places), block),)](places.T.contiguous(), out, len(places), block=block, others=64, num_warps=2)

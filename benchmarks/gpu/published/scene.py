@@ -23,7 +23,7 @@ class Scene:
     """T trained frames in square frames of `side` px, of which a box common to all is kept; a step sees B of them."""
 
     side: np.ndarray
-    """() px."""
+    """A scalar, px."""
     pixels: np.ndarray
     """(T, h, w, 4) uint8, premultiplied RGB and mask."""
     corner: np.ndarray

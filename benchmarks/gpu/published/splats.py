@@ -11,7 +11,8 @@ kernels beside this file; both work on P pairs of a tile and a splat, each pair 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import torch
 
@@ -56,7 +57,8 @@ class Composite(torch.autograd.Function):
     """(image, alpha) of rows (B, N, PAIR) by their lists on a sheet."""
 
     @staticmethod
-    def forward(ctx, rows, lists: Lists, sheet: Sheet):
+    def forward(ctx: Any, rows: torch.Tensor, lists: Lists, sheet: Sheet) -> tuple[torch.Tensor, torch.Tensor]:
+        """Image (B, h, w, 3) and alpha (B, h, w). rows: (B, N, PAIR)."""
         passes = choose_passes(rows)
         pairs = rows.reshape(-1, PAIR)[lists.splat].T.contiguous()
         colour, left, last = passes[0](pairs, lists, sheet)
@@ -65,7 +67,8 @@ class Composite(torch.autograd.Function):
         return colour + left[..., None] * sheet.background[:, None, None], 1 - left
 
     @staticmethod
-    def backward(ctx, grad_image, grad_alpha):
+    def backward(ctx: Any, grad_image: torch.Tensor, grad_alpha: torch.Tensor) -> tuple[torch.Tensor, None, None]:
+        """Of rows (B, N, PAIR). grad_image: (B, h, w, 3); grad_alpha: (B, h, w)."""
         pairs, left, last = ctx.saved_tensors
         sheet = ctx.sheet
         ground = sheet.background if sheet.exact else sheet.background[:, :1].expand(-1, 3)
@@ -75,8 +78,8 @@ class Composite(torch.autograd.Function):
         return rows.index_add_(0, ctx.lists.splat, grad.T.contiguous()).reshape(ctx.shape), None, None
 
 
-def choose_passes(rows: torch.Tensor):
-    """The kernels on a GPU, their plain reference elsewhere."""
+def choose_passes(rows: torch.Tensor) -> tuple[Callable, Callable]:
+    """The kernels on a GPU, their plain reference elsewhere. rows: (B, N, PAIR)."""
     if not rows.is_cuda:
         return composite, composite_back
     from gsac.benchmarks.gpu.published import kernels
@@ -131,7 +134,9 @@ def composite_back(pairs: torch.Tensor, left: torch.Tensor, last: torch.Tensor, 
 
 def alphas(part: torch.Tensor, at: tuple[torch.Tensor, torch.Tensor],
            sheet: Sheet) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Of pairs (PAIR, p) at rows (y,) and columns (x,): alpha, falloff, and middle minus pixel across and down, (p, y, x) each."""
+    """Of a part (PAIR, p) of the pairs at rows (y,) and columns (x,): alpha, falloff, and middle minus pixel across and down,
+    (p, y, x) each.
+    """
     x, y, a, b, c = part[:5, :, None, None]
     dx, dy = x - at[1][None, None], y - at[0][None, :, None]
     power = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy
@@ -140,7 +145,7 @@ def alphas(part: torch.Tensor, at: tuple[torch.Tensor, torch.Tensor],
     return torch.where((power <= 0) & (alpha >= LEAST), alpha, 0), falloff, dx + 0 * dy, dy + 0 * dx
 
 
-def each_tile(lists: Lists, sheet: Sheet):
+def each_tile(lists: Lists, sheet: Sheet) -> Iterator[tuple[int, int, tuple, tuple]]:
     """First and end pair of each tile that has any, its pixels as an index of (B, h, w), and their rows and columns, px."""
     for tile in (lists.start[1:] > lists.start[:-1]).nonzero()[:, 0].tolist():
         frame, inside = divmod(tile, lists.rows * lists.columns)

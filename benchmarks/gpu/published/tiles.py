@@ -36,7 +36,7 @@ class Lists(NamedTuple):
 
 
 def radii(covariance: torch.Tensor) -> torch.Tensor:
-    """(...,) px, three deviations of splats (..., 2, 2) along their longest axis."""
+    """(...,) px, three deviations of splats of covariance (..., 2, 2) along their longest axis."""
     a, b, c = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
     middle = (a + c) / 2
     return torch.ceil(3 * torch.sqrt(middle + torch.sqrt((middle**2 - (a * c - b * b)).clamp(min=0.1))))

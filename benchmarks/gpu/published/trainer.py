@@ -84,7 +84,7 @@ class Trainer:
         return loss, shift, drawn.radius
 
     def step(self, step: int) -> torch.Tensor:
-        """Takes a step, from 0. Returns its loss."""
+        """Takes a step, from 0. Returns its loss, a scalar."""
         self.adam.param_groups[0]["lr"] = formulas.xyz_rate(step, STEPS)
         self.adam.zero_grad()
         loss, shift, radius = self.loss(step)

@@ -107,7 +107,10 @@ def normal_equations(gaussians: Gaussians, share: np.ndarray, poses: Poses, t: i
 
 
 def differentiate(found: Residuals, share: np.ndarray, poses: Poses, t: int, view: View) -> NormalEquations:
-    """The normal equations of the residuals that frame t has with its pose as it stands, before its workspace is used again."""
+    """The normal equations of the residuals that frame t has with its pose as it stands, before its workspace is used again.
+
+    share: (N, TURNING) `joint_shares` of the gaussians.
+    """
     means = found.state.means.copy()
     grads = render_bound_backward(found.state, found.colour, found.mask)
     grad_pose, grad_transl, _, _ = poses.gradients(t, grads.vertices)
