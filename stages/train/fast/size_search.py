@@ -49,16 +49,16 @@ def search(task: Task, backend: Backend) -> Fit:
     poses = carry_to_untrained(task.poses, task.trained)
     task.progress(0, len(sizes), "sizes at most")
     with ThreadPoolExecutor(1) as aside:
-        judging = aside.submit(judge_largest, largest, task, poses)
+        judging = aside.submit(judge_largest, largest, sizes[0], task, poses)
         trained = refit_fewer(largest, sizes[1], task, backend)  # that size is tried whatever the first one's score
-        tried = [judging.result(), judge_size(trained, task, poses)]
+        tried = [judging.result(), judge_size(trained, sizes[1], task, poses)]
     for size in sizes[2:]:
         task.progress(len(tried), len(sizes), "sizes at most")
         scores = [score for _, score in tried]
         if choose(scores) is not scores[-1] and not task.config.every_size:
             break
         trained = refit_fewer(trained, size, task, backend)
-        tried.append(judge_size(trained, task, poses))
+        tried.append(judge_size(trained, size, task, poses))
     fits, scores = [fit for fit, _ in tried], [score for _, score in tried]
     best = choose(scores)
     figures = {"size_curve": [asdict(score) | score.means() | {"chosen": score is best} for score in scores],
@@ -82,19 +82,19 @@ def refit_fewer(trained: Trained, size: int, task: Task, backend: Backend) -> Tr
     return trained._replace(trainer=backend.refit(task, merged, fine, OF_SIZE, coarse))
 
 
-def judge_largest(trained: Trained, task: Task, poses: Poses) -> tuple[Fit, SizeScore]:
+def judge_largest(trained: Trained, size: int, task: Task, poses: Poses) -> tuple[Fit, SizeScore]:
     """`judge_size`, after the choosing frames of `poses` were moved to their images with these gaussians."""
     converge(trained.trainer.gaussians(), poses, task.choosing, task.views, POSE_ROUNDS)
-    return judge_size(trained, task, poses)
+    return judge_size(trained, size, task, poses)
 
 
-def judge_size(trained: Trained, task: Task, poses: Poses) -> tuple[Fit, SizeScore]:
-    """The finished gaussians, and how well they show the choosing frames in these poses."""
+def judge_size(trained: Trained, size: int, task: Task, poses: Poses) -> tuple[Fit, SizeScore]:
+    """The finished gaussians, and how well they show the choosing frames in these poses. size: that was asked for."""
     trainer = trained.trainer
     fit = Fit(*trainer.finish(trained.coarse), dict(trainer.gains))
     rows, = judge_person([Candidate(fit.gaussians, poses, task.choosing, task.filmed)])
     decibels = [psnr(row["mse_fg"]) or 0.0 for row in rows]  # 0 where neither shows the person, whatever the size
-    return fit, SizeScore(len(fit.gaussians), decibels, [row["detail"] for row in rows])
+    return fit, SizeScore(size, decibels, [row["detail"] for row in rows])
 
 
 def list_sizes(largest: int) -> list[int]:
