@@ -8,7 +8,7 @@ import re
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -82,12 +82,12 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
                   "-start_number", "0", "-fps_mode", "passthrough", "-f", "image2", "%06d.png",
                   "-map", "[small]", "-fps_mode", "passthrough", "-f", "rawvideo", "pipe:1"]
 
-        def decode(needed: np.ndarray | None) -> Written:
+        def decode(how: Decoding) -> Written:
             looks.clear()
             return _run(path, video, output, frames, lambda done: progress(done, len(picks), "frames"),
-                        lambda pictures: looks.extend(map(look_at, _read_pictures(pictures, *small))), needed)
+                        lambda pictures: looks.extend(map(look_at, _read_pictures(pictures, *small))), how)
 
-        return decode(None) if chains is None else decode_needed(decode, chains, picks, frames)
+        return decode_by_need(decode, chains, picks, frames)
 
     def write_scene(scene: Scene) -> WrittenScene:
         picks = pick_frames(times, scene, config, chains)
@@ -201,17 +201,36 @@ def pick_frames(times: np.ndarray, scene: Scene, config: SplitConfig, chains: Ch
     return picks if chains is None else chains.move_picks(picks, times)
 
 
-def decode_needed(decode: Callable[[np.ndarray | None], Written], chains: Chains, picks: np.ndarray, frames: Path) -> Written:
-    """Writes the frames `picks` (K,) by what they need alone; by all of the video where that fails or something seems damaged.
+@dataclass(frozen=True)
+class Decoding:
+    """What a run of ffmpeg decodes, and how."""
 
-    decode: writes them, by what is needed, (N,) bool, or None for all.
-    """
-    with contextlib.suppress(StageError):  # programs older than 7.1 cannot
-        written = decode(chains.needed(picks))
-        if len(written[0]) == len(picks) and not written[2]:
-            return written
-    remove_frames(frames)
-    return decode(None)
+    needed: np.ndarray | None = None
+    """(N,) bool, frames to decode; None: all."""
+    alone: bool = False
+    """By one thread: of a damaged frame several make what the moment makes of it, another picture each time."""
+
+
+def decode_by_need(decode: Callable[[Decoding], Written], chains: Chains | None, picks: np.ndarray, frames: Path) -> Written:
+    """Writes the frames `picks` (K,): by what they need alone where `chains` tells it, by all of the video where that fails, and by
+    one thread where something is damaged, so that the same video always gives the same frames."""
+    if chains is not None:
+        with contextlib.suppress(StageError):  # programs older than 7.1 cannot
+            written = decode(Decoding(chains.needed(picks)))
+            if is_sound(written, picks):
+                return written
+        remove_frames(frames)
+    written = decode(Decoding())
+    if not is_sound(written, picks):
+        remove_frames(frames)
+        written = decode(Decoding(alone=True))
+    return written
+
+
+def is_sound(written: Written, picks: np.ndarray) -> bool:
+    """Whether all frames `picks` (K,) came without an error."""
+    ticks, _, errors = written
+    return len(ticks) == len(picks) and not errors
 
 
 def remove_frames(folder: Path) -> None:
@@ -271,14 +290,14 @@ def _picture_filters(video: Video, crop: Crop | None, width: int, height: int) -
 
 
 def _run(path: Path, video: Video, output: list[str], folder: Path | None, on_frame: Callable[[int], None] = lambda done: None,
-         read: Callable[[IO[bytes]], None] = lambda pictures: None, needed: np.ndarray | None = None) -> Written:
-    """Runs ffmpeg. read: reads what it writes to its output, to the end; needed: (N,) bool, frames to decode, None: all.
+         read: Callable[[IO[bytes]], None] = lambda pictures: None, how: Decoding = Decoding()) -> Written:
+    """Runs ffmpeg. read: reads what it writes to its output, to the end.
 
     Returns the ticks of the frames that passed `showinfo`, their time base, and its error lines.
     """
-    decoder = ["-c:v", video.decoder] if video.decoder else []
+    decoder = [*(["-threads", "1"] if how.alone else []), *(["-c:v", video.decoder] if video.decoder else [])]
     limits = [word for name, value in LIMITS.items() for word in (f"-{name}", value)]
-    left_out = _leave_out(video.sent, needed) if needed is not None else []
+    left_out = _leave_out(video.sent, how.needed) if how.needed is not None else []
     command = [ffmpeg_program(), "-nostdin", "-hide_banner", "-loglevel", "level+info", "-copyts",
                "-max_error_rate", "1", "-fflags", "+discardcorrupt", *limits, *decoder, *left_out, "-i", file_url(path), *output]
     ticks: list[int] = []
