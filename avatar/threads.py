@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -17,13 +17,15 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 Item = TypeVar("Item")
+Room = TypeVar("Room")
 Result = TypeVar("Result")
 Share = Callable[..., None]
 """Type of `Workspace.share`: what it calls takes any arguments."""
 
 MOST_THREADS = 8
 """Threads of one kernel at most: its shares grow too small; a GPU training's CPU half takes 12.8 s on 8 cores, 18.6 on 16."""
-_pools: dict[int, ThreadPoolExecutor] = {}
+_pools: dict[str, ThreadPoolExecutor] = {}
+"""`kernels` do shares of kernels, `callers` call kernels for items of their own: who waits never fills the pool waited for."""
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pools.clear)
 
@@ -62,10 +64,7 @@ class Workspace:
         if self.workers <= 1:
             kernel(0, 1, *arguments)
             return
-        pool = _pools.get(self.workers)
-        if pool is None:
-            pool = _pools[self.workers] = ThreadPoolExecutor(self.workers - 1, thread_name_prefix="kernel")
-        others = [pool.submit(kernel, worker, self.workers, *arguments) for worker in range(1, self.workers)]
+        others = [_pool("kernels").submit(kernel, worker, self.workers, *arguments) for worker in range(1, self.workers)]
         try:
             kernel(0, self.workers, *arguments)
         finally:
@@ -91,6 +90,27 @@ def side_by_side(work: Callable[[Item, Workspace], Result], items: Iterable[Item
     with ThreadPoolExecutor(many) as pool:
         parts = list(pool.map(part, range(many)))
     return [parts[i % many][i // many] for i in range(len(items))]
+
+
+def on_each(rooms: Sequence[Room], work: Callable[[Item, Room], Result], items: Sequence[Item]) -> list[Result]:
+    """[work(item, room)], the items side by side, each in a room of its own, that is its buffers: for few items, step after step.
+
+    A result may lie in its room. items: at most as many as rooms.
+    """
+    others = [_pool("callers").submit(work, item, room) for item, room in zip(items[1:], rooms[1:], strict=False)]
+    try:
+        first = work(items[0], rooms[0])
+    finally:
+        rest = [other.result() for other in others]
+    return [first, *rest]
+
+
+def _pool(name: str) -> ThreadPoolExecutor:
+    """Its threads start when there is something to do."""
+    pool = _pools.get(name)
+    if pool is None:
+        pool = _pools[name] = ThreadPoolExecutor(kernel_threads(), thread_name_prefix=name)
+    return pool
 
 
 def prefetch(pool: ThreadPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item], most: int) -> Iterator[Result]:

@@ -91,6 +91,25 @@ def test_what_goes_wrong_with_an_item_is_heard(monkeypatch):
         side_by_side(lambda item, own: 1 / item, [2, 1, 0])
 
 
+@pytest.mark.parametrize("cores", [1, 2, 5])
+def test_few_items_are_worked_on_at_the_same_time_each_in_its_own_workspace(monkeypatch, cores):
+    monkeypatch.setattr(threads, "available_cores", lambda: cores)
+    rooms, both = [Workspace(2), Workspace(2)], threading.Barrier(2)
+
+    def work(item: int, own: Workspace) -> np.ndarray:
+        both.wait(timeout=20)
+        buffer = own.take("numbers", (5,), np.int64)
+        own.share(mark, buffer)
+        return buffer * item
+
+    for _ in range(3):
+        found = threads.on_each(rooms, work, [1, 10])
+        assert [each.tolist() for each in found] == [[1, 2, 1, 2, 1], [10, 20, 10, 20, 10]]
+    assert threads.on_each(rooms, lambda item, own: own, [7]) == rooms[:1]
+    with pytest.raises(ZeroDivisionError):
+        threads.on_each(rooms, lambda item, own: 1 / item, [1, 0])
+
+
 def test_prefetched_results_come_in_order_and_at_most_so_many_wait():
     started, taken = [], 0
     with ThreadPoolExecutor(2) as pool:

@@ -1,4 +1,4 @@
-"""Recipe `fast` on the CPU."""
+"""Recipe `fast` on the CPU: as many steps side by side as `Trainer.learn` takes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
 from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, person_pixels
-from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.fast.trainer import AT_ONCE, Step, Trainer
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import correct_midway
 from gsac.stages.train.poses.poses import Poses
@@ -30,7 +30,10 @@ class Cpu(Backend):
     device = "cpu"
 
     def train(self, task: Task, count: int) -> Trained:
-        """As `Backend.train`; keeps checkpoints, and goes on from task.resumed where there is one."""
+        """As `Backend.train`; keeps checkpoints, and goes on from task.resumed where there is one.
+
+        What changes midway does so before the first step, of those side by side, that is due.
+        """
         config = task.config
         rng = np.random.default_rng(config.seed)
         fine = crop_views(task)
@@ -44,20 +47,23 @@ class Cpu(Backend):
             trainer, first = Trainer.from_state(task.resumed["trainer"], task), task.resumed["step"]
             order, rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
             task.resumed = None
-        midway = round(MIDWAY * steps) if config.pose_rounds else -1
-        for step in range(first, steps):
+        midway = round(MIDWAY * steps) // AT_ONCE * AT_ONCE if config.pose_rounds else -1
+        for step in range(first, steps, AT_ONCE):
             if step == midway:
                 correct_midway(task.poses, task.trained, trainer.gaussians, trainer.face, coarse if step < coarse_until else fine)
-            if not order:
-                order = [int(t) for t in rng.permutation(task.trained)]
-            t, done = order.pop(), step / steps
-            if trainer.offsets and done >= OFFSET_SHARE:
+            if trainer.offsets and step / steps >= OFFSET_SHARE:
                 trainer.fold_offsets()
                 trainer.lay_unseen(coarse)
-            loss = trainer.step(t, (coarse if step < coarse_until else fine)[t], done, rng.random(3), step)
-            task.checkpoint(step + 1, steps, loss, trainer.gaussians)
-            task.keep(step + 1, steps, partial(loop_state, step + 1, order, rng, trainer))
-            task.progress(step + 1, steps, "steps")
+            these: list[Step] = []
+            for number in range(step, min(step + AT_ONCE, steps)):
+                order = order or [int(t) for t in rng.permutation(task.trained)]
+                t = order.pop()
+                these.append(Step(t, (coarse if number < coarse_until else fine)[t], number / steps, rng.random(3), number))
+            for done, loss in enumerate(trainer.learn(these), step + 1):
+                task.checkpoint(done, steps, loss, trainer.gaussians)
+            done = step + len(these)
+            task.keep(done, steps, partial(loop_state, done, order, rng, trainer))
+            task.progress(done, steps, "steps")
         if trainer.offsets:
             trainer.fold_offsets()
             trainer.lay_unseen(coarse)
@@ -70,15 +76,19 @@ class Cpu(Backend):
         trainer.config = refit_config(task.config, pace)
         order: list[int] = []
         steps = refit_steps(task.config, pace)
-        averaged = max(1, round(pace.averaged * steps))
+        averaged = max(1, round(pace.averaged * steps / AT_ONCE))
         coarse_until = round(coarse_share(person_pixels(task)) * steps) if coarse else 0
         sums = {name: np.zeros(value.shape) for name, value in trainer.values.items()}
-        for step in range(steps):
-            order = order or [int(t) for t in rng.permutation(task.trained)]
-            t = order.pop()
-            shown = coarse if coarse and step < coarse_until else views
-            trainer.step(t, shown[t], pace.begin + (1 - pace.begin) * step / steps, rng.random(3), step)
-            if step >= steps - averaged:
+        begins = range(0, steps, AT_ONCE)
+        for begin in begins:
+            these: list[Step] = []
+            for number in range(begin, min(begin + AT_ONCE, steps)):
+                order = order or [int(t) for t in rng.permutation(task.trained)]
+                t = order.pop()
+                shown = coarse if coarse and number < coarse_until else views
+                these.append(Step(t, shown[t], pace.begin + (1 - pace.begin) * number / steps, rng.random(3), number))
+            trainer.learn(these)
+            if begin in begins[-averaged:]:
                 for name, value in trainer.values.items():
                     sums[name] += value
         trainer.values = {name: (total / averaged).astype(np.float32) for name, total in sums.items()}
@@ -104,8 +114,10 @@ class CpuRounds(Rounds):
 
     def learn(self, number: int) -> None:
         frames, backgrounds, done = self._plan[number]
-        for step, (t, background) in enumerate(zip(frames, backgrounds, strict=True)):
-            self._trainer.step(int(t), self._views[int(t)], done, background, step)
+        steps = [Step(t, self._views[t], done, background, number)
+                 for number, (t, background) in enumerate(zip(map(int, frames), backgrounds, strict=True))]
+        for begin in range(0, len(steps), AT_ONCE):
+            self._trainer.learn(steps[begin:begin + AT_ONCE])
 
     def gaussians(self) -> Gaussians:
         return self._trainer.gaussians()

@@ -1,5 +1,8 @@
 """The optimiser of recipe `fast` on the CPU: gaussians with Adam's state, one frame a step, poses refined on the way.
 
+Two steps are worked out side by side, both from the gaussians as they stand, then taken one after the other: images are too small
+to keep several cores busy with one, and a gradient that is late by one step teaches the same.
+
 One gaussian budget from the start, no densification; half the size first; rates that decay; all poses corrected together before
 the steps (`prealign`) and midway (`bundle_adjust`). Gaussians are limited after every step instead of being penalised in the loss:
 no needle, no giant and no floater can arise, whatever the weights.
@@ -17,7 +20,7 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.logistic import logit, sigmoid
 from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backward
-from gsac.avatar.threads import Workspace, side_by_side
+from gsac.avatar.threads import Workspace, kernel_threads, on_each, side_by_side
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
 from gsac.stages.train.fast.schedule import (
@@ -42,22 +45,43 @@ from gsac.stages.train.views import View
 
 KEPT = ("face", "values", "first", "second", "count", "start", "light", "seen")
 """Attributes of Trainer that go into a checkpoint as they are."""
+AT_ONCE = 2
+"""Steps that are worked out side by side, on any number of cores: results shall not depend on it."""
 EVIDENCE_FRAMES = 20
 """Frames at most, spread evenly, that tell how well a place is seen, once it is known which gaussians are seen at all."""
 
 
+class Step(NamedTuple):
+    """What a step is made on."""
+
+    frame: int
+    view: View
+    done: float
+    """Share of the steps so far."""
+    background: np.ndarray
+    """(3,) in 0..1."""
+    number: int
+
+
 class StepGradients(NamedTuple):
     loss: float
-    bound: BoundGradients
-    """Of vertices and gaussians."""
-    opacity: np.ndarray
-    """(N,) opacities, not a gradient, that the image was drawn with."""
+    values: dict[str, np.ndarray]
+    """Name of a gaussian's value -> (N, ...)."""
+    vertices: np.ndarray
+    """(V, 3)."""
     gain: np.ndarray
     """(3,) of the frame's gain."""
 
 
+class Room(NamedTuple):
+    """Buffers that one frame's step works in."""
+
+    drawing: Workspace
+    losses: Workspace
+
+
 class Trainer:
-    """Gaussians with Adam's state, and one step of the optimisation."""
+    """Gaussians with Adam's state, and steps of the optimisation."""
 
     def __init__(self, gaussians: Gaussians, task: Task, frozen_body: bool = False, scale: float = 1.0):
         """frozen_body: the surface and the poses stay where they are; scale: size that it is drawn at, of the images'."""
@@ -81,7 +105,8 @@ class Trainer:
         """(N,) bool, whether frames show the gaussian, once that is decided; the others no longer move."""
         self.guessed = find_guessed_faces(task.poses.body, task.poses.params.sigma_joints)
         """Frame -> (F,) bool, faces on limbs that are not where the frame shows them."""
-        self.workspace, self.losses = Workspace(), Workspace()
+        self.rooms = [Room(Workspace(each), Workspace(each)) for each in [max(1, kernel_threads() // AT_ONCE)] * AT_ONCE]
+        self.workspace = Workspace()
 
     @property
     def reach(self) -> float:
@@ -114,31 +139,28 @@ class Trainer:
         return Gaussians(self.face, v["mu"].copy(), v["quat"].copy(), v["log_scale"].copy(), v["rgb"].copy(),
                          sigmoid(v["opacity_logit"][:, 0]), self.light, self.low_pass)
 
-    def step(self, t: int, view: View, done: float, background: np.ndarray, number: int) -> float:
-        """One step on frame t. done: share of the steps so far; background: (3,) in 0..1; number: of the step. Returns the loss."""
-        config = self.config
-        loss, grads, opacity, grad_gain = self.gradients(t, view, background, number)
-        by_name = self._by_name(grads, opacity)
-        if t in self.guessed:
-            self._forget_guessed(t, by_name, grads.vertices)
-        self.workspace.share(self._advance, t, by_name, grads.vertices, done)
-        if config.exposure:
-            gain = self.gains.get(t, np.ones(3))
-            self.gains[t] = np.clip(gain - GAIN_RATE * np.sign(grad_gain) * 0.1**done, 0.5, 2).astype(np.float64)
-        require_finite(f"after step {number}",
-                       self.values | {"offset of the surface": self.poses.offset, **named_pose(self.poses, t)})
-        return loss
+    def learn(self, steps: list[Step]) -> list[float]:
+        """Steps, at most `AT_ONCE`, each by the gradient of the values before the first of them. Returns their losses."""
+        gradients = on_each(self.rooms, self.gradients, steps)
+        self.workspace.share(self._advance, steps, gradients)
+        if self.config.exposure:
+            for step, grads in zip(steps, gradients, strict=True):
+                gain = self.gains.get(step.frame, np.ones(3))
+                self.gains[step.frame] = np.clip(gain - GAIN_RATE * np.sign(grads.gain) * 0.1**step.done, 0.5, 2).astype(np.float64)
+        require_finite(f"after step {steps[-1].number}", self.values | {"offset of the surface": self.poses.offset} |
+                       {name: value for step in steps for name, value in named_pose(self.poses, step.frame).items()})
+        return [grads.loss for grads in gradients]
 
-    def _advance(self, worker: int, workers: int, t: int, grads: dict[str, np.ndarray], grad_vertices: np.ndarray,
-                 done: float) -> None:
-        """A worker's share of a step: the first one moves frame t's body, where that is learned, the others the gaussians."""
-        if not self.frozen_body:
-            if worker == 0:
-                self._move_body(t, grad_vertices, done)
-            if workers > 1:
-                worker, workers = worker - 1, workers - 1
-        if worker >= 0:
-            self._move(worker, workers, grads, done)
+    def _advance(self, worker: int, workers: int, steps: list[Step], gradients: list[StepGradients]) -> None:
+        """A worker's share of the steps: the first one moves frames' bodies, where they are learned, the others the gaussians."""
+        moves_body = worker == 0 and not self.frozen_body
+        if workers > 1 and not self.frozen_body:
+            worker, workers = worker - 1, workers - 1
+        for step, grads in zip(steps, gradients, strict=True):
+            if moves_body:
+                self._move_body(step.frame, grads.vertices, step.done)
+            if worker >= 0:
+                self._move(worker, workers, grads.values, step.done)
 
     def _move_body(self, t: int, grad_vertices: np.ndarray, done: float) -> None:
         """One step of frame t's pose and of the body's shape. grad_vertices: (V, 3)."""
@@ -157,26 +179,29 @@ class Trainer:
         if config.joint_rate and self.pose_rate:
             self.poses.step_joints(grad_joints, config.joint_rate * 0.01**done, config.pose_pull)
 
-    def gradients(self, t: int, view: View, background: np.ndarray, number: int) -> StepGradients:
-        """Of the loss of frame t. background: (3,) in 0..1; number: of the step."""
-        config, v = self.config, self.values
+    def gradients(self, step: Step, room: Room) -> StepGradients:
+        """Of the loss of a frame; they lie in the room's buffers."""
+        config, v, t, view = self.config, self.values, step.frame, step.view
+        share, take = room.drawing.share, room.losses.take
         vertices = self.poses.vertices(t)
         shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity_logit"][:, 0]), self.light,
                           self.low_pass)
-        rendering = render_bound(vertices, self.faces, shown, view.camera, self.workspace)
-        background = background.astype(np.float32)
-        gain = self.gains.get(t, np.ones(3)).astype(np.float32)
-        take, real = self.losses.take, rendering.rgb.dtype
+        rendering = render_bound(vertices, self.faces, shown, view.camera, room.drawing)
+        background, gain = step.background.astype(np.float32), self.gains.get(t, np.ones(3)).astype(np.float32)
+        real = rendering.rgb.dtype
         image, target, grad_rgb = (take(name, rendering.rgb.shape, real) for name in ("image", "target", "grad_rgb"))
         grad_alpha, spans = take("grad_alpha", rendering.alpha.shape, real), take("spans", (len(image), 2), np.int64)
-        on_background(self.workspace.share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target, spans)
-        loss, grad_image = self._image_loss(image, target, spans)
+        on_background(share, rendering.rgb, rendering.alpha, view.pixels, background, gain, image, target, spans)
+        loss, grad_image = self._image_loss(image, target, spans, room.losses)
         grad_gain = np.empty(3)
-        loss += through_background(self.workspace.share, grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain,
+        loss += through_background(share, grad_image, rendering.rgb, rendering.alpha, view.pixels, background, gain,
                                    config.mask, grad_rgb, grad_alpha, grad_gain)
         grads = render_bound_backward(rendering.state, grad_rgb, grad_alpha)
-        require_finite(f"at step {number}", {"loss": loss, **named_gradients(grads)})
-        return StepGradients(float(loss), grads, shown.opacity, grad_gain)
+        require_finite(f"at step {step.number}", {"loss": loss, **named_gradients(grads)})
+        by_name = self._by_name(grads, shown.opacity)
+        if t in self.guessed:
+            self._forget_guessed(t, by_name, grads.vertices)
+        return StepGradients(float(loss), by_name, grads.vertices, grad_gain)
 
     def fold_offsets(self) -> None:
         """Moves the body's displacement into the gaussians: from here on they are bound to the plain body."""
@@ -228,19 +253,18 @@ class Trainer:
 
         return sum(side_by_side(added, views.items()), np.zeros(len(self.face))) / len(views)
 
-    def _image_loss(self, image: np.ndarray, target: np.ndarray, spans: np.ndarray) -> tuple[float, np.ndarray]:
+    def _image_loss(self, image: np.ndarray, target: np.ndarray, spans: np.ndarray,
+                    workspace: Workspace) -> tuple[float, np.ndarray]:
         """Value and gradient (h, w, 3). image, target: (h, w, 3); spans: (h, 2) of `on_background`."""
         config = self.config
-        gradient = self.losses.take("gradient", image.shape, image.dtype)
+        gradient = workspace.take("gradient", image.shape, image.dtype)
         gradient[:] = 0
-        loss, _ = losses.l2(image, target, gradient=gradient, workspace=self.losses, spans=spans)
+        loss, _ = losses.l2(image, target, gradient=gradient, workspace=workspace, spans=spans)
         if config.ssim:
-            similarity = losses.ssim(image, target, factor=-config.ssim, gradient=gradient, workspace=self.losses,
-                                     spans=spans).value
+            similarity = losses.ssim(image, target, factor=-config.ssim, gradient=gradient, workspace=workspace, spans=spans).value
             loss += config.ssim * (1 - similarity)
         if config.sobel:
-            loss += config.sobel * losses.sobel(image, target, factor=config.sobel, gradient=gradient,
-                                                workspace=self.losses).value
+            loss += config.sobel * losses.sobel(image, target, factor=config.sobel, gradient=gradient, workspace=workspace).value
         return loss, gradient
 
     def _by_name(self, grads: BoundGradients, opacity: np.ndarray) -> dict[str, np.ndarray]:

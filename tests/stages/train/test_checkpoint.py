@@ -12,6 +12,7 @@ import pytest
 
 from gsac.stages.train import checkpoint
 from gsac.stages.train.checkpoint import Checkpoints
+from gsac.stages.train.fast.trainer import AT_ONCE
 from gsac.stages.train.stage import run
 
 KILLED = """
@@ -42,7 +43,7 @@ GROWS_SOON = {"paper.densify.FIRST": 1, "paper.densify.EVERY": 4, "paper.densify
 
 @pytest.mark.slow
 @pytest.mark.parametrize("values, stop, constants", [
-    ({"steps": 40, "exposure": True}, 13, {}), ({"steps": 40}, 31, {}), ({"steps": 30, "gaussians": "auto"}, 30, FEW),
+    ({"steps": 40, "exposure": True}, 14, {}), ({"steps": 40}, 32, {}), ({"steps": 30, "gaussians": "auto"}, 30, FEW),
     ({"recipe": "paper", "steps": 12}, 9, GROWS_SOON)],
     ids=["fast, while the surface moves", "fast, after that", "fast, before the size search", "paper, after it has grown"])
 def test_a_training_that_was_killed_and_goes_on_gives_the_bytes_of_an_unbroken_one(job, tmp_path, monkeypatch, values, stop,
@@ -65,7 +66,7 @@ def test_a_training_that_was_killed_and_goes_on_gives_the_bytes_of_an_unbroken_o
     broken.progress = lambda step, total, unit: unit == "steps" and steps.append(step)
     spent = Checkpoints(broken.scratch, broken.warn).read()["spent"][0]
     run(broken)
-    assert steps[0] == stop + 1 if stop < values["steps"] else not steps
+    assert stop < steps[0] <= stop + AT_ONCE if stop < values["steps"] else not steps
     assert told == [(stop, values["steps"], "steps")]
     for name in ("avatar.npz", "body.npz", "metrics.json"):
         assert (whole.out / name).read_bytes() == (broken.out / name).read_bytes()

@@ -29,7 +29,7 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     from gsac.stages.train.config import TrainConfig
     from gsac.stages.train.fast.cuda import make_recipe
     from gsac.stages.train.fast.schedule import GAIN_RATE, OFFSET_SHARE, shortest_axis
-    from gsac.stages.train.fast.trainer import Trainer
+    from gsac.stages.train.fast.trainer import Step, Trainer
     from gsac.stages.train.gaussians.cloth_offsets import fold
     from gsac.stages.train.poses.poses import Poses
     from gsac.stages.train.views import View
@@ -55,7 +55,7 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
             cpu.fold_offsets()
         t = int(cuda.order[step, 0])
         shot = still.shots[t]
-        losses.append(cpu.step(t, View(shot.camera, shot.pixels, (0, 0)), step / steps, backgrounds[step], step))
+        losses += cpu.learn([Step(t, View(shot.camera, shot.pixels, (0, 0)), step / steps, backgrounds[step], step)])
     cuda.train(int(np.ceil(steps * OFFSET_SHARE)))
     cuda.replace(fold(cuda.gaussians(), still.body.rest[0], cuda.offset(), still.body.faces))
     cuda.train(steps)

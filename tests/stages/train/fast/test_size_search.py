@@ -57,14 +57,14 @@ def test_a_size_is_the_mean_of_its_last_steps():
     class Steps:
         values = {"mu": np.zeros((2, 3), np.float32)}
 
-        def step(self, t, view, done, background, number):
-            self.values = {"mu": self.values["mu"] + np.float32(number)}
+        def learn(self, steps):
+            self.values = {"mu": self.values["mu"] + np.float32(steps[-1].number)}
             places.append(self.values["mu"])
 
     refitted = Cpu().refit(SimpleNamespace(config=config, trained=np.arange(3)), Steps(), dict.fromkeys(range(3)),
                             refit.Pace(share=0.4, begin=0.15, averaged=0.1, widened=3.0))
-    assert len(places) == 40
-    np.testing.assert_allclose(refitted.values["mu"], np.mean(places[-4:], 0))
+    assert len(places) == 20
+    np.testing.assert_allclose(refitted.values["mu"], np.mean(places[-2:], 0))
 
 
 @pytest.mark.slow

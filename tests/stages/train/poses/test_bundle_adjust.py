@@ -12,7 +12,7 @@ from gsac.avatar.threads import Workspace
 from gsac.stages.train.fast import prealign
 from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.initial_gaussians import init_gaussians
-from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.fast.trainer import Step, Trainer
 from gsac.stages.train.poses import bundle_adjust, photometric
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.task import Task
@@ -106,7 +106,7 @@ def test_rounds_in_the_midst_correct_held_out_frames_too_and_become_the_base_of_
     trainer = Trainer(init_gaussians(task, views, 3000), task)
     trainer.pose_rate = 0.0
     for step, t in enumerate(np.tile(task.trained, 6)):
-        trainer.step(int(t), views[int(t)], 0.3, np.ones(3), step)
+        trainer.learn([Step(int(t), views[int(t)], 0.3, np.ones(3), step)])
     poses.transl[:, 0] += TRUE_SHIFT / 2
     bundle_adjust.correct_midway(poses, task.trained, trainer.gaussians, trainer.face, views)
     off = np.abs(poses.transl[:, 0]) / (TRUE_SHIFT / 2)
