@@ -21,6 +21,7 @@ from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.feature_distance import LEAST_SIDE
 from gsac.avatar.files import write_file
+from gsac.avatar.freed_memory import hand_back
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import figures, mean_psnr, summary
@@ -168,11 +169,11 @@ class Run:
 
     def __init__(self, job: Job, poses: Poses, camera: Camera, views: list[View], trained: np.ndarray, held: np.ndarray,
                  choosing: np.ndarray):
-        """camera: of the frames on disk; views: (T,), to train on. Indices of frames: trained (n,); held (m,), which are judged;
-        choosing (c,), which the recipe chooses by.
+        """camera: of the frames on disk; views: (T,), to train on, emptied after that. Indices of frames: trained (n,); held (m,),
+        which are judged; choosing (c,), which the recipe chooses by.
         """
         self.job, self.poses, self.camera, self.views, self.trained, self.held = job, poses, camera, views, trained, held
-        self.choosing = choosing
+        self.choosing, self.trained_camera = choosing, views[0].frame
         self.curve: list[dict] = []
         self.losses: list[float] = []
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
@@ -212,6 +213,8 @@ class Run:
         self.seconds, self.cpu_seconds = self.clock()
         require_finite("after the last step", named_result(self.result.gaussians, self.poses))
         self.seen_area = seen_area(self.poses, self.trained, self.views)
+        self.views.clear()  # judging takes as much memory again
+        hand_back()
         for level in self.result.coarser:
             require_finite("after the last step", named_values(level))
 
@@ -312,7 +315,7 @@ class Run:
         """The content of metrics.json. folder: where the images of the held-out frames go."""
         config, held = self.job.config, self.held
         small = {t: view.reduced(SMALL) for t, view in self.filmed.items()}
-        trained = self.views[0].frame
+        trained = self.trained_camera
         aligned, ttpo, small_ttpo = poses.copy(), [], []
         with ThreadPoolExecutor(1) as aside:  # a GPU is this thread's alone
             judging = aside.submit(self.judge_both, gaussians, poses, small, folder)

@@ -67,6 +67,7 @@ class Cpu(Backend):
         if trainer.offsets:
             trainer.fold_offsets()
             trainer.lay_unseen(coarse)
+        trainer.free_buffers()
         return Trained(trainer, fine, coarse)
 
     def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,
@@ -91,6 +92,7 @@ class Cpu(Backend):
             if begin in begins[-averaged:]:
                 for name, value in trainer.values.items():
                     sums[name] += value
+        trainer.free_buffers()
         trainer.values = {name: (total / averaged).astype(np.float32) for name, total in sums.items()}
         return trainer
 

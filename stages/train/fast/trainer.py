@@ -79,6 +79,12 @@ class Room(NamedTuple):
     drawing: Workspace
     losses: Workspace
 
+    @classmethod
+    def open(cls) -> Room:
+        """Empty, with its share of the cores."""
+        workers = max(1, kernel_threads() // AT_ONCE)
+        return cls(Workspace(workers), Workspace(workers))
+
 
 class Trainer:
     """Gaussians with Adam's state, and steps of the optimisation."""
@@ -105,8 +111,8 @@ class Trainer:
         """(N,) bool, whether frames show the gaussian, once that is decided; the others no longer move."""
         self.guessed = find_guessed_faces(task.poses.body, task.poses.params.sigma_joints)
         """Frame -> (F,) bool, faces on limbs that are not where the frame shows them."""
-        self.rooms = [Room(Workspace(each), Workspace(each)) for each in [max(1, kernel_threads() // AT_ONCE)] * AT_ONCE]
-        self.workspace = Workspace()
+        self.rooms: list[Room] = []
+        """`AT_ONCE` from the first step on."""
 
     @property
     def reach(self) -> float:
@@ -141,8 +147,9 @@ class Trainer:
 
     def learn(self, steps: list[Step]) -> list[float]:
         """Steps, at most `AT_ONCE`, each by the gradient of the values before the first of them. Returns their losses."""
+        self.rooms = self.rooms or [Room.open() for _ in range(AT_ONCE)]
         gradients = on_each(self.rooms, self.gradients, steps)
-        self.workspace.share(self._advance, steps, gradients)
+        Workspace().share(self._advance, steps, gradients)
         if self.config.exposure:
             for step, grads in zip(steps, gradients, strict=True):
                 gain = self.gains.get(step.frame, np.ones(3))
@@ -150,6 +157,10 @@ class Trainer:
         require_finite(f"after step {steps[-1].number}", self.values | {"offset of the surface": self.poses.offset} |
                        {name: value for step in steps for name, value in named_pose(self.poses, step.frame).items()})
         return [grads.loss for grads in gradients]
+
+    def free_buffers(self) -> None:
+        """Gives the steps' buffers back, hundreds of MB of large frames; the next step opens new ones."""
+        self.rooms = []
 
     def _advance(self, worker: int, workers: int, steps: list[Step], gradients: list[StepGradients]) -> None:
         """A worker's share of the steps: the first one moves frames' bodies, where they are learned, the others the gaussians."""

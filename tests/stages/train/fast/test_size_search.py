@@ -61,6 +61,9 @@ def test_a_size_is_the_mean_of_its_last_steps():
             self.values = {"mu": self.values["mu"] + np.float32(steps[-1].number)}
             places.append(self.values["mu"])
 
+        def free_buffers(self):
+            """It has no buffers."""
+
     refitted = Cpu().refit(SimpleNamespace(config=config, trained=np.arange(3)), Steps(), dict.fromkeys(range(3)),
                             refit.Pace(share=0.4, begin=0.15, averaged=0.1, widened=3.0))
     assert len(places) == 20
