@@ -92,6 +92,8 @@ class Code(Enum):
                           "Keep the hands beside the body.")
     ARM_DOUBTFUL = Wording("The {side} arm is doubtful in {frames}: the pictures do not show it as fitted.",
                            "Let the arms hang a little away from the body, hands in sight.")
+    LEGS_DOUBTFUL = Wording("The person sways over the feet, which is hardly seen along the view: there the feet may be off by "
+                            "{figure:.0f} cm in {frames}.", "Turn with small steps, hips over the feet.")
     MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
     NOT_MEASURED = Wording("No frame is held out (usable frames: {figure}, train.holdout is {holdout}): the quality of this avatar "

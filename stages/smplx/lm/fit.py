@@ -31,6 +31,7 @@ from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.lm.shake import transl_acceleration
 from gsac.stages.smplx.lm.swapped_sides import DEARER, MARGIN, believe_by_faces, propose_by_faces, propose_swapped
 from gsac.stages.smplx.lm.turn_jumps import find_jumps, find_turned_over
+from gsac.stages.smplx.lm.unseen_sway import find_unseen_sway
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -81,6 +82,8 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     hidden.widen(sigma)
     for side in (0, 1):
         widen_arm(sigma, side, doubtful[:, [side]])
+    chain = problem.skeleton.pose(state.local, state.shape)
+    said += find_unseen_sway(state.local[:, 0], chain.place + state.transl[:, None])
     said += describe_arms(Code.HAND_HIDDEN, hidden.mark(len(sigma))) + describe_arms(Code.ARM_DOUBTFUL, doubtful)
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
                problem.person_offsets.joint_offset(state.own), tuple(said), cost)
