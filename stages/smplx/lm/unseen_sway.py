@@ -13,8 +13,8 @@ from gsac.avatar.yaw import turn_seen
 from gsac.stages.findings import Code, Finding
 
 LEAST = 0.04
-"""m, missing sway (standard deviation) from which the legs are doubtful: feet are then off by 10 cm in one frame of eighty, at 0.065
-in one of eight."""
+"""m, missing sway (standard deviation) from which the legs are doubtful: feet are then off by 10 cm in one frame of eighty, and at
+0.065 in one of eight."""
 LEAST_TURN = 270.0
 """Degrees that the frames show at least: of who hardly turns nothing says that they sway alike in both directions."""
 
