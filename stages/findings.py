@@ -108,6 +108,8 @@ class Code(Enum):
     CHECKPOINT_UNREADABLE = Wording("The checkpoint {path} cannot be read ({error}); training starts anew.", severity=Severity.NEWS)
     FROZEN = Wording("The picture stands still in {frames} while time goes on; these frames are not used.",
                      "Film without pausing, with no other program open on the phone.", Severity.WRONG)
+    TURNED_UPRIGHT = Wording("The person lies on the side in the footage; it was turned by a quarter to the {way}.",
+                             "Turn the clip in the phone's gallery if that is wrong.", Severity.NEWS)
     MIRRORED = Wording("The picture is mirrored in {frames}; these frames are {treated}.",
                        "Give one recording, without cuts and effects.", Severity.NEWS)
     REPEATED = Wording("Pictures repeat in {frames}; these frames are not used.",

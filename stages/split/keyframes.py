@@ -30,6 +30,6 @@ def read_key_frames(path: Path, video: Video, count: int, width: int, height: in
                 return
             if frame is None:
                 return
-            quarters = round(frame.rotation / 90) % 4
+            quarters = (round(frame.rotation / 90) + video.quarters) % 4
             size = (height, width) if quarters % 2 else (width, height)
             yield np.ascontiguousarray(np.rot90(frame.to_ndarray(format="rgb24", width=size[0], height=size[1]), quarters))

@@ -16,6 +16,8 @@ from gsac.avatar.artifacts import Crop, write_alpha
 from gsac.avatar.mask_file import MaskError, read_mask, resize_mask, scale_mask
 from gsac.stages.contract import BadInput
 from gsac.stages.split.film import MASKS
+from gsac.stages.split.pick import turn_size
+from gsac.stages.split.upright import turn
 
 SUFFIXES = (".png", ".exr")
 Key = TypeVar("Key", int, str)
@@ -71,12 +73,12 @@ def _take(masks: Mapping[Key, Path], name: Key, file: str, what: str) -> Path:
 
 
 def write_masks(frames: Path, files: list[Path], footage: tuple[int, int], crop: Crop | None, size: tuple[int, int],
-                turned: np.ndarray) -> None:
+                turned: np.ndarray, quarters: int = 0) -> None:
     """Writes masks/%06d.exr as the frames of a video are made. footage, size: width and height of the video and of the frames, px;
-    turned: (T,) bool, frames that were mirrored and turned back."""
+    turned: (T,) bool, frames that were mirrored and turned back; quarters: by which the footage was turned (`upright`)."""
     (frames / MASKS).mkdir()
     for t, path in enumerate(files):
-        mask = load_mask(path, *(size if crop is None else footage))
+        mask = turn(load_mask(path, *turn_size(*(size if crop is None else footage), quarters)), quarters)
         if crop is not None:
             mask = mask[crop.y: crop.y + crop.height, crop.x: crop.x + crop.width]
         write_alpha(frames / MASKS / f"{t:06d}.exr", resize_mask(mask[:, ::-1] if turned[t] else mask, *size))

@@ -12,6 +12,8 @@ from gsac.avatar.blazepose import Pose, PoseNetworks
 from gsac.avatar.region import Region
 from gsac.stages.split.crop import Extent, plan_crop
 
+SHOULDERS, HIPS = [11, 12], [23, 24]
+"""Of the landmark network's points."""
 LEAST_SCORE = 0.5
 """Of detector and landmark network alike, for a person to count as seen."""
 LEAST_SEEN = 0.75
@@ -49,6 +51,14 @@ class People:
             found = Extent.of(pose.points).joined(found)
         self.seen += found is not None
         return found
+
+    def lean(self, image: np.ndarray) -> float | None:
+        """How far the trunk of the person in image (H, W, 3) uint8 leans from upright, rad, rising clockwise as seen, -pi..pi; None
+        where nobody is seen."""
+        for pose in self._poses(image):
+            x, y = pose.points[SHOULDERS].mean(0) - pose.points[HIPS].mean(0)
+            return float(np.arctan2(x, -y))
+        return None
 
     def follow(self, image: np.ndarray) -> Extent | None:
         """As `look`, of one person, who is looked for at the last place first, in half the time. image: (H, W, 3) uint8."""

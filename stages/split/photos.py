@@ -19,8 +19,9 @@ from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import plan_crop, principal_point
 from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, PLATE, VIDEO_SUFFIXES, find_plates
 from gsac.stages.split.people import People, find_extent
-from gsac.stages.split.pick import fit_size, pick_evenly
+from gsac.stages.split.pick import fit_size, pick_evenly, turn_size
 from gsac.stages.split.picture_quality import HEIGHT, judge_pictures, look_at
+from gsac.stages.split.upright import LARGE_ENOUGH, LOOKS, describe_quarters, find_quarters, turn
 
 UNSUPPORTED = {".dng", ".raw", ".cr2", ".nef"}
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
@@ -69,7 +70,11 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
     if len(picks) < len(photos):
         warn(Finding.of(Code.PHOTOS_DROPPED, figure=len(picks), given=len(photos), count=config.count))
     usual = usual_size(picks)
-    crop = find_crop(picks, usual, config, people)
+    quarters = 0 if people is None else find_quarters(people, read_small(picks, usual))
+    if quarters:
+        warn(describe_quarters(quarters))
+    usual = turn_size(*usual, quarters)
+    crop = find_crop(picks, usual, config, people, quarters)
     width, height = fit_size(*usual if crop is None else (crop.width, crop.height), config.max_height)
 
     def fit(rgb: np.ndarray, exif: Image.Exif) -> tuple[np.ndarray, float | None]:
@@ -87,11 +92,12 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
             continue
         if had_alpha:
             notes.add(COMPOSITED)
-        if (rgb.shape[1], rgb.shape[0]) != usual:
+        if turn_size(rgb.shape[1], rgb.shape[0], quarters) != usual:
             other.append(path.name)
         if mask_of is not None:
-            write_alpha(frames / MASKS / f"{len(focals):06d}.exr", fit(mask_of(path, rgb.shape[1], rgb.shape[0]), exif)[0])
-        shown, focal_px = fit(rgb, exif)
+            mask = turn(mask_of(path, rgb.shape[1], rgb.shape[0]), quarters)
+            write_alpha(frames / MASKS / f"{len(focals):06d}.exr", fit(mask, exif)[0])
+        shown, focal_px = fit(turn(rgb, quarters), exif)
         del rgb  # before the next one is read
         write_frame(frames / f"{len(focals):06d}.png", shown)
         focals.append(focal_px)
@@ -109,7 +115,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         rgb, _, had_alpha = read_photo(plate)
         if had_alpha:
             notes.add(COMPOSITED)
-        write_frame(frames / "plate.png", fit(rgb, Image.Exif())[0])
+        write_frame(frames / "plate.png", fit(turn(rgb, quarters), Image.Exif())[0])
     repeated, findings = judge_pictures(looks, timed=moments is not None)
     for finding in findings:
         warn(finding)
@@ -132,8 +138,10 @@ def photo_times(photos: list[Path], fps: float) -> np.ndarray:
     return (numbers - numbers[0]) / fps
 
 
-def find_crop(photos: list[Path], usual: tuple[int, int], config: SplitConfig, people: People | None) -> Crop | None:
-    """About the person in all photos; None where they stay whole. usual: width and height, px, that most of them have."""
+def find_crop(photos: list[Path], usual: tuple[int, int], config: SplitConfig, people: People | None,
+              quarters: int = 0) -> Crop | None:
+    """About the person in all photos; None where they stay whole. usual: width and height, px, that most of them have once they are
+    turned by so many quarters."""
     if people is None or config.max_height is None or usual[1] <= config.max_height:
         return None
     size = fit_size(*usual, config.max_height)
@@ -141,11 +149,20 @@ def find_crop(photos: list[Path], usual: tuple[int, int], config: SplitConfig, p
     def small() -> Iterator[np.ndarray]:
         for path in photos:
             with contextlib.suppress(BadInput):  # it is left out, and read_photo says why
-                rgb, exif, _ = read_photo(path, size)
-                yield fit_photo(rgb, exif, *size)[0]
+                rgb, exif, _ = read_photo(path, turn_size(*size, quarters))
+                yield fit_photo(turn(rgb, quarters), exif, *size)[0]
 
     extent = find_extent(people, small(), *usual, config.max_height)
     return plan_crop(extent, *usual, config.max_height) if extent is not None else None
+
+
+def read_small(photos: list[Path], usual: tuple[int, int]) -> Iterator[np.ndarray]:
+    """(h, w, 3) uint8 of some of the photos, by which they are turned. usual: width and height, px, that most of them have."""
+    size = fit_size(*usual, LARGE_ENOUGH)
+    for i in pick_evenly(len(photos), LOOKS):
+        with contextlib.suppress(BadInput):
+            rgb, exif, _ = read_photo(photos[i], size)
+            yield fit_photo(rgb, exif, *size)[0]
 
 
 def usual_size(photos: list[Path]) -> tuple[int, int]:
@@ -191,10 +208,11 @@ def place_photo(rgb: np.ndarray, exif: Image.Exif, usual: tuple[int, int], crop:
     return _resize(part, *size), None if focal_px is None else focal_px * crop.scale
 
 
-def write_plate_of_video(plate: Path, frames: Path, footage: tuple[int, int], crop: Crop | None, size: tuple[int, int]) -> None:
+def write_plate_of_video(plate: Path, frames: Path, footage: tuple[int, int], crop: Crop | None, size: tuple[int, int],
+                         quarters: int = 0) -> None:
     """Writes plate.png as the frames of a video are made. Raises BadInput where it is no picture of the video's aspect. footage,
-    size: width and height of the video and of the frames, px."""
-    rgb = read_photo(plate)[0]
+    size: width and height of the video and of the frames, px; quarters: by which the footage was turned (`upright`)."""
+    rgb = turn(read_photo(plate)[0], quarters)
     height, width = rgb.shape[:2]
     if abs(width / height * footage[1] / footage[0] - 1) >= SAME_ASPECT:
         raise BadInput(f"{plate.name}: has {width}x{height} px, the video {footage[0]}x{footage[1]}; a plate beside a video is a "

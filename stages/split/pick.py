@@ -38,3 +38,8 @@ def fit_size(width: int, height: int, max_height: int | None) -> tuple[int, int]
     if max_height is None or height <= max_height:
         return width, height
     return max(1, round(width * max_height / height)), max_height
+
+
+def turn_size(width: int, height: int, quarters: int) -> tuple[int, int]:
+    """Width and height of a picture after that."""
+    return (height, width) if quarters % 2 else (width, height)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from av.container import InputContainer
 
 from gsac.stages.contract import BadInput
+from gsac.stages.split.pick import turn_size
 
 HLG, PQ, BT2020_PRIMARIES, BT2020_MATRIX, UNSPECIFIED = 18, 16, 9, 9, 2
 """Code points of ITU-T H.273."""
@@ -41,7 +42,7 @@ class Video:
     """Number of frames by the header; 0 where it has none."""
     width: int
     height: int
-    """Displayed size, px: after the rotation tag, with square pixels."""
+    """Displayed size, px: after the rotation tag and `quarters`, with square pixels."""
     transfer: int
     primaries: int
     matrix: int
@@ -52,6 +53,13 @@ class Video:
     """Frames a second by the header."""
     tags: dict[str, str]
     """Metadata of container and stream; keys in lower case."""
+    quarters: int = 0
+    """By which it is turned beside its tag, counter-clockwise as seen, so that its person stands (`upright`)."""
+
+    def turned(self, quarters: int) -> Video:
+        """The same, turned by that much more."""
+        width, height = turn_size(self.width, self.height, quarters)
+        return replace(self, width=width, height=height, quarters=(self.quarters + quarters) % 4)
 
 
 def probe(path: Path) -> Video:

@@ -34,6 +34,7 @@ from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
 from gsac.stages.split.picture_quality import HEIGHT, Look, judge_pictures, look_at
 from gsac.stages.split.probe import BT2020_MATRIX, BT2020_PRIMARIES, HLG, LIMITS, PQ, UNSPECIFIED, Video, file_url, probe
 from gsac.stages.split.scenes import Scene, choose_scene, divide
+from gsac.stages.split.upright import FILTERS, LARGE_ENOUGH, LOOKS, describe_quarters, find_quarters
 
 TRANSFER_NAMES = {HLG: "arib-std-b67", PQ: "smpte2084"}
 SHOWN = re.compile(r"\bn:\s*\d+ pts:\s*(-?\d+)")
@@ -42,7 +43,7 @@ LONGEST_S = 24 * 3600
 SCALING = "lanczos+accurate_rnd+full_chroma_int+full_chroma_inp+bitexact"
 COMPRESSION = {False: ("-compression_level", "4", "-pred", "up"), True: ("-compression_level", "0", "-pred", "none")}
 """Of the frames' files, by whether it has to be quick: it takes 80 ms a frame of noise to write, and 15 each time to read."""
-LOOKS, CHECKS, TRIES = 12, 30, 3
+PLANS, CHECKS, TRIES = 12, 30, 3
 """Most key frames by which a crop is planned, most frames in which it is checked, and crops tried before the frames stay whole; as
 often a scene is cut down to one that may show further cuts, now that its frames lie closer."""
 
@@ -69,13 +70,15 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     if not 0 <= times[-1] <= LONGEST_S:
         raise BadInput(f"{path.name}: its frames lie {times[-1]:g} s apart from first to last; at most {LONGEST_S} s are read. "
                        "Copy the file from the phone again, or cut the clip.")
+    video = video if people is None else stand_upright(path, video, people, warn)
     looks: list[Look] = []
     chains = Chains.of(video) if config.quick else None
 
     def write(picks: np.ndarray, crop: Crop | None) -> Written:
         width, height = frame_size(video, config, crop)
         small = fit_size(width, height, HEIGHT)
-        graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + _picture_filters(video, crop, width, height))
+        graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + FILTERS[video.quarters]
+                         + _picture_filters(video, crop, width, height))
         output = ["-filter_complex", f"[0:{video.stream}]{graph},format=rgb24,split[whole][fine];"
                                      f"[fine]scale={small[0]}:{small[1]}:flags=area+bitexact,format=rgb24[small]",
                   "-map", "[whole]", "-pix_fmt", "rgb24", *COMPRESSION[config.quick], "-flags", "+bitexact",
@@ -117,7 +120,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     if masks:
         mask_of = match_frames(masks, len(times), picks)
         write_masks(frames, [mask_of[int(at)] for at in np.searchsorted(video.ticks, shown)], (video.width, video.height), crop,
-                    frame_size(video, config, crop), mirrored & (crop is None))
+                    frame_size(video, config, crop), mirrored & (crop is None), video.quarters)
     repeated, findings = judge_pictures(looks, timed=True)
     if crop is not None:
         repeated |= mirrored
@@ -131,7 +134,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
     span = float(times[-1])
     width, height = frame_size(video, config, crop)
     if plate is not None:
-        write_plate_of_video(plate, frames, (video.width, video.height), crop, (width, height))
+        write_plate_of_video(plate, frames, (video.width, video.height), crop, (width, height), video.quarters)
     whole_width, whole_height = (width, height) if crop is None else (video.width * crop.scale, video.height * crop.scale)
     return {
         "fps": (len(times) - 1) / span if span > 0 else video.rate,
@@ -141,6 +144,15 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         "center": None if crop is None else principal_point(crop, (width, height), video.width, video.height),
         "repeated": np.flatnonzero(repeated).tolist(),
     }
+
+
+def stand_upright(path: Path, video: Video, people: People, warn: Callable[[Finding], None]) -> Video:
+    """The video, turned where its person lies on the side."""
+    small = fit_size(video.width, video.height, LARGE_ENOUGH)
+    quarters = find_quarters(people, read_key_frames(path, video, LOOKS, *small))
+    if quarters:
+        warn(describe_quarters(quarters))
+    return video.turned(quarters)
 
 
 def frame_size(video: Video, config: SplitConfig, crop: Crop | None) -> tuple[int, int]:
@@ -180,7 +192,7 @@ def write_about_person(path: Path, video: Video, frames: Path, config: SplitConf
     if people is None or config.max_height is None or video.height <= config.max_height:
         return None, write(None)
     whole = video.width, video.height, config.max_height
-    looks = read_key_frames(path, video, LOOKS, *frame_size(video, config, None))
+    looks = read_key_frames(path, video, PLANS, *frame_size(video, config, None))
     extent = find_extent(people, looks, *whole)
     for _ in range(TRIES):
         crop = plan_crop(extent, *whole) if extent is not None else None
