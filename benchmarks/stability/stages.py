@@ -67,8 +67,9 @@ def write_artifact(origin: Origin, value: Any, path: Path) -> None:
 def _compute(stage: Stage, values: dict[str, Any], ports: dict[str, Path], out: Path) -> None:
     said: list[Finding] = []
     config = make_config(stage, values)
-    names = stage.models(config)
-    models = ModelStore(Store.open()).need(list(names), lambda *words: None) if names else {}
+    store = ModelStore(Store.open())
+    names = [*stage.models(config), *(name for name in stage.wishes(config) if store.has(name))]
+    models = store.need(names, lambda *words: None) if names else {}
     run = importlib.import_module(f"gsac.stages.{stage.name}.stage").run
     run(Job({port: ports[port] for port in stage.inputs}, out, config, models,
             warn=lambda finding: said.append(finding.to_json() | {"message": finding.message})))

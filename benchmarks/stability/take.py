@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from gsac.avatar.artifacts import frame_paths, read_arrays, read_frame
 from gsac.benchmarks.fit.truth import Truth, read_truth
@@ -54,6 +55,15 @@ class Take:
         names = ("frames", "masks", "points", "times", "yaw", "number", "asked", "rotation")
         each = {name: getattr(self, name)[order] for name in names}
         return replace(self, **each)
+
+    def turned(self, quarters: int) -> Take:
+        """The take turned by so many quarters, counter-clockwise as seen."""
+        points = self.points
+        for width in (self.size[::-1] * 2)[:quarters]:
+            points = np.stack([points[..., 1], width - points[..., 0]], -1)
+        own = Rotation.from_euler("z", -90 * quarters, degrees=True).as_matrix()  # y points down
+        return replace(self, frames=np.rot90(self.frames, quarters, (1, 2)), masks=np.rot90(self.masks, quarters, (1, 2)),
+                       points=points, rotation=own @ self.rotation)
 
     def boxes(self) -> np.ndarray:
         """Left, top, right and bottom (T, 4) px of the person; zeros where there is none."""

@@ -27,6 +27,7 @@ from gsac.benchmarks.stability.take import Take, read_take
 from gsac.pipeline.clip_check import LAST, PARAMS, check_clip
 from gsac.pipeline.journal import plain_journal
 from gsac.stages.contract import BadInput, StageError
+from gsac.stages.findings import Code
 from gsac.stages.severity import Severity
 from gsac.turntable.options import TurntableOptions
 
@@ -241,6 +242,8 @@ def _split(film: Film, folder: Path, values: dict[str, Any]) -> tuple[dict[str, 
     ports["clip"].unlink()
     clip = Clip.read(ports["split/clip.json"])
     take = film.take.at(film.number(np.array(clip.timestamps_s)))
+    quarters = [int(finding["figure"]) for finding in said if finding["code"] == Code.TURNED_UPRIGHT.word]
+    take = take.turned(quarters[0]) if quarters else take
     if film.plain:  # the file's own fault is in its times
         ports["split/clip.json"] = folder / "clip.json"
         replace(clip, timestamps_s=take.times.tolist(), focal_px=take.focal).write(ports["split/clip.json"])

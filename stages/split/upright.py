@@ -49,4 +49,4 @@ def turn(picture: np.ndarray, quarters: int) -> np.ndarray:
 
 def describe_quarters(quarters: int) -> Finding:
     """What the user is told."""
-    return Finding.of(Code.TURNED_UPRIGHT, way="left" if quarters == 1 else "right")
+    return Finding.of(Code.TURNED_UPRIGHT, figure=quarters, way="left" if quarters == 1 else "right")

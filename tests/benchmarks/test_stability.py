@@ -117,7 +117,23 @@ def test_the_truth_rolls_with_the_camera():
     corner[31, 35] = True  # a point at the right edge
     turned, _ = FAULTS["roll"].inject(replace(make_take(), masks=np.tile(corner, (FRAMES, 1, 1))), 4, 0)
     row = np.argwhere(turned.masks[0]).mean(0)[0]
-    assert np.sign(row - HEIGHT / 2) == np.sign((quarter.rotation[0] @ [1, 0, 0])[1])
+    assert turned.size == (WIDTH, HEIGHT)
+    assert np.sign(row - WIDTH / 2) == np.sign((quarter.rotation[0] @ [1, 0, 0])[1])
+
+
+def test_a_take_turned_by_quarters_shows_its_points_where_they_are_and_comes_back():
+    take = make_take()
+    mask = np.zeros((FRAMES, HEIGHT, WIDTH), bool)
+    mask[:, 9, 4] = True
+    take = replace(take, masks=mask, points=np.tile([4.5, 9.5], (FRAMES, 23, 1)))
+    turned = take
+    for _ in range(3):
+        turned = turned.turned(1)
+        y, x = np.argwhere(turned.masks[0])[0]
+        assert np.allclose(turned.points[0, 0], (x + 0.5, y + 0.5))
+    assert np.array_equal(turned.masks, take.turned(3).masks) and np.allclose(turned.points, take.turned(3).points)
+    back = turned.turned(1)
+    assert np.array_equal(back.masks, mask) and np.allclose(back.points, take.points) and np.allclose(back.rotation, take.rotation)
 
 
 @pytest.mark.parametrize("name", ["head-cut", "feet-cut", "leaves"])
