@@ -15,6 +15,12 @@ from gsac.stages.keypoints.detection import Frame
 SECOND_SCORE = 0.7
 """Least score, of detector and landmark network alike, for a second person to be reported."""
 
+STAYS, GONE = 0.15, 0.5
+"""How far `apart` the nearest detection lies from the last place if it may be somebody else, and if it hardly is the same person:
+from frame to frame who turns on the spot moves by 0.05."""
+BESIDE = 0.25
+"""How far `apart` another person is at least."""
+
 
 class Tracker:
     """Starts with the largest and most central person, then takes the one nearest to the last place.
@@ -49,10 +55,12 @@ class Tracker:
         else:
             last = self._last
             order = sorted(persons, key=lambda p: apart(p.region, last))
-            if not order or apart(order[0].region, last) > 0.5:
-                # The detector may miss a person whom the landmark network still finds at the last place.
+            nearest = apart(order[0].region, last) if order else np.inf
+            if nearest > STAYS:
+                # The detector may miss a person, a back beside another's face, whom the landmark network still finds at the last
+                # place; who moved on is found where the detector has them.
                 pose = self._pose.pose(image, last)
-                if pose.score >= self._least:
+                if pose.score >= self._least and (nearest > GONE or apart(pose.region, last) < nearest / 2):
                     return pose
         for person in order:
             pose = self._pose.pose(image, person.region)
@@ -63,7 +71,7 @@ class Tracker:
     def _second(self, image: np.ndarray, persons: list[Person], pose: Pose, frame: Frame) -> None:
         """Notes in the frame whether somebody else is seen."""
         for person in persons:
-            if apart(person.region, pose.region) < 0.4:
+            if apart(person.region, pose.region) < BESIDE:
                 continue
             other = self._pose.pose(image, person.region)
             score = min(person.score, other.score)
