@@ -28,8 +28,8 @@ class SplitConfig:
     decoded, to key frames and soon after them, and their files are not compressed."""
 
     def wishes(self) -> tuple[str, ...]:
-        """Names of the network files that find the person."""
-        return NETWORKS if self.crop and self.max_height is not None else ()
+        """Names of the network files that find the person: whether they stand, and where."""
+        return NETWORKS
 
     def check(self) -> None:
         if self.fps is not None and not 0 < self.fps < float("inf"):

@@ -142,7 +142,7 @@ def find_crop(photos: list[Path], usual: tuple[int, int], config: SplitConfig, p
               quarters: int = 0) -> Crop | None:
     """About the person in all photos; None where they stay whole. usual: width and height, px, that most of them have once they are
     turned by so many quarters."""
-    if people is None or config.max_height is None or usual[1] <= config.max_height:
+    if people is None or not config.crop or config.max_height is None or usual[1] <= config.max_height:
         return None
     size = fit_size(*usual, config.max_height)
 

@@ -33,7 +33,7 @@ def run(job: Job) -> None:
         raise BadInput(f"{source.name}: the file is empty; expected a video or a folder of photos.")
     else:
         photos = [source] if source.suffix.lower() in PHOTO_SUFFIXES else []
-    people = People(job.models) if job.config.crop and all(name in job.models for name in NETWORKS) else None
+    people = People(job.models) if all(name in job.models for name in NETWORKS) else None
     if photos:
         fields: dict[str, Any] = split_photos(photos, plate, frames, job.config, people, job.warn, job.progress,
                                               match_photos(masks, photos))

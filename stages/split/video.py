@@ -189,7 +189,7 @@ def write_about_person(path: Path, video: Video, frames: Path, config: SplitConf
                        write: Callable[[Crop | None], Written]) -> tuple[Crop | None, Written]:
     """Writes the frames, cut where the key frames say that it is worth while; and again, wider or whole, where the frames show that
     it cuts the person."""
-    if people is None or config.max_height is None or video.height <= config.max_height:
+    if people is None or not config.crop or config.max_height is None or video.height <= config.max_height:
         return None, write(None)
     whole = video.width, video.height, config.max_height
     looks = read_key_frames(path, video, PLANS, *frame_size(video, config, None))
