@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from concurrent.futures import Future, ThreadPoolExecutor
+from threading import Thread
 from typing import Any
 
 from gsac.pipeline.report.origin import drawn_from, read_origin
@@ -12,27 +12,31 @@ from gsac.pipeline.run_folder import REPORT, RunFolder
 
 
 class EarlySections:
-    """Sections of the report that are drawn while the last stages are at work."""
+    """Sections of the report that are drawn while the last stages are at work. An interrupted run does not wait for them."""
 
     def __init__(self, folder: RunFolder):
-        self.folder, self._pool = folder, ThreadPoolExecutor(1)
+        self.folder = folder
         self._drawn: dict[str, Any] = {}
-        self._last: Future[None] | None = None
+        self._drawing: Thread | None = None
 
     def start(self, coming: list[str]) -> None:
         """Draws what is not drawn yet. coming: the stages whose results are not there yet."""
-        self._last = self._pool.submit(self._draw, coming)
+        self._drawing = Thread(target=self._draw, args=(coming, self._drawing), daemon=True)
+        self._drawing.start()
 
-    def _draw(self, coming: list[str]) -> None:
-        from gsac.pipeline.report.page import draw_sections
+    def _draw(self, coming: list[str], before: Thread | None) -> None:
+        """before: what draws already."""
+        if before is not None:
+            before.join()
+        with contextlib.suppress(Exception):  # it is drawn at the end, which tells why it cannot be
+            from gsac.pipeline.report.page import draw_sections
 
-        self._drawn = draw_sections(self.folder.root, coming, self._drawn)
+            self._drawn = draw_sections(self.folder.root, coming, self._drawn)
 
     def sections(self) -> dict[str, Any]:
         """Sections by name; those that are missing are still to be drawn."""
-        with contextlib.suppress(Exception):
-            if self._last is not None:
-                self._last.result()
+        if self._drawing is not None:
+            self._drawing.join()
         return self._drawn
 
 

@@ -1,10 +1,26 @@
 """report.html is drawn anew exactly when what it was drawn from differs, and never loses parts."""
 
 import shutil
+import subprocess
+import sys
 
 import pytest
 
 from gsac.pipeline.report.origin import read_origin
+
+
+INTERRUPTED = """
+import sys, threading
+from pathlib import Path
+from gsac.pipeline.report.refresh import EarlySections
+from gsac.pipeline.run_folder import RunFolder
+start = threading.Thread.start
+def interrupted(self):
+    start(self)
+    raise KeyboardInterrupt
+threading.Thread.start = interrupted
+EarlySections(RunFolder(Path(sys.argv[1]))).start(["train"])
+"""
 
 
 def page(toy):
@@ -80,3 +96,8 @@ def test_report_of_dead_links_is_refused_with_the_way_back_and_the_good_page_sta
     assert done.code == 2 and "which is gone" in done.err and f"`gsac run {toy.clip} --out" in done.err
     assert page(toy).read_text() == whole
     assert toy.run().code == 0 and toy.gsac("report", toy.out).code == 0
+
+
+def test_an_interrupt_at_the_moment_when_early_sections_begin_ends_the_process(tmp_path):
+    done = subprocess.run([sys.executable, "-c", INTERRUPTED, tmp_path], capture_output=True, text=True, timeout=60)
+    assert done.returncode != 0 and "KeyboardInterrupt" in done.stderr
