@@ -8,7 +8,6 @@ import pytest
 
 from gsac.pipeline.report.origin import read_origin
 
-
 INTERRUPTED = """
 import sys, threading
 from pathlib import Path
