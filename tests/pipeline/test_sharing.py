@@ -133,6 +133,7 @@ def test_sigkill_while_a_run_uploads_or_fetches_leaves_nothing_torn_here_nor_the
         process.kill()
         process.communicate()
         server.trouble = lambda method, name: None
+        server.settle()
         server.objects = {name: there for name, there in server.objects.items() if "/leases/" not in name}  # they would expire
         assert toy.run(**server.env).code == 0 and toy.result == computed[1]
         assert toy.gsac("cache", "verify").code == 0

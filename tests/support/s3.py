@@ -35,6 +35,8 @@ class Bucket:
     """What goes wrong with a request, if anything: `500`, `403`, `cut`, `spoil`, `lost`, `slow`."""
     clock_apart_s: float = 0.0
     slow_s: float = 30.0
+    serving: int = 0
+    """Requests that are not answered yet."""
     lock: threading.Lock = field(default_factory=threading.Lock)
     stopping: threading.Event = field(default_factory=threading.Event)
 
@@ -48,6 +50,11 @@ class Bucket:
         """Names below one table, such as `actions`, without the prefix."""
         with self.lock:
             return sorted(name.removeprefix("prefix/") for name in self.objects if name.startswith(f"prefix/{table}/"))
+
+    def settle(self) -> None:
+        """Waits until all requests are answered, those of clients that were killed, too."""
+        while self.serving:
+            time.sleep(0.01)
 
     def age(self, seconds: float) -> None:
         """Makes all that is there older."""
@@ -79,6 +86,15 @@ class _Handler(BaseHTTPRequestHandler):
         self._serve("POST")
 
     def _serve(self, method: str) -> None:
+        with self.bucket.lock:
+            self.bucket.serving += 1
+        try:
+            self._serve_one(method)
+        finally:
+            with self.bucket.lock:
+                self.bucket.serving -= 1
+
+    def _serve_one(self, method: str) -> None:
         parts = urlsplit(self.path)
         name = unquote(parts.path).removeprefix("/bucket").removeprefix("/")
         query = {key: values[0] for key, values in parse_qs(parts.query, keep_blank_values=True).items()}
