@@ -113,6 +113,8 @@ class Options:
     """Preset that the parameters were made with."""
     anyway: bool = False
     """Whether the run goes on where nothing can come of the clip."""
+    fleeting: bool = False
+    """Whether the folder goes with the run's end: nothing that tells of the run is written into it."""
 
 
 class ClipRun:
@@ -311,15 +313,19 @@ class ClipRun:
 
     @contextlib.contextmanager
     def _writing_results(self, clip: Path, digest: str, options: Options) -> Iterator[None]:
-        """run.json, metrics.json and dvc.lock are written however the run ends."""
+        """run.json, metrics.json and dvc.lock are written however the run ends, unless their folder goes with it."""
         try:
             yield
         finally:
             self.entries = {"quality": quality_entry(options.quality, self.configs)} | self._judged_forecast()
-            write_rows(self.folder, self.graph, self.store, [result.to_json() for result in self.results],
-                       {"clip": str(clip), "clip_digest": digest} | self.entries)
-            digests = {port: digest for result in self.results for port, digest in (result.inputs | result.outputs).items()}
-            dvc_sync.write_lock(self.folder, self.graph, self.finished, self.configs, self.store, digests)
+            if not options.fleeting:
+                self._write_results(clip, digest)
+
+    def _write_results(self, clip: Path, digest: str) -> None:
+        write_rows(self.folder, self.graph, self.store, [result.to_json() for result in self.results],
+                   {"clip": str(clip), "clip_digest": digest} | self.entries)
+        digests = {port: digest for result in self.results for port, digest in (result.inputs | result.outputs).items()}
+        dvc_sync.write_lock(self.folder, self.graph, self.finished, self.configs, self.store, digests)
 
     @property
     def finished(self) -> list[str]:

@@ -246,7 +246,9 @@ def _split(film: Film, folder: Path, values: dict[str, Any]) -> tuple[dict[str, 
     take = take.turned(quarters[0]) if quarters else take
     if film.plain:  # the file's own fault is in its times
         ports["split/clip.json"] = folder / "clip.json"
-        replace(clip, timestamps_s=take.times.tolist(), focal_px=take.focal).write(ports["split/clip.json"])
+        half = folder / f"clip-{os.getpid()}.json"  # trials beside this one read the clean clip's, too
+        replace(clip, timestamps_s=take.times.tolist(), focal_px=take.focal).write(half)
+        half.replace(ports["split/clip.json"])
     return ports, said, take
 
 

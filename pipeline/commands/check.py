@@ -28,7 +28,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     project, clip = Project.at_hand(), find_clip(arguments.clip)
     configs = resolve(project, options={"gsac check": PARAMS})
-    options = Options(until=LAST)
+    options = Options(until=LAST, fleeting=True)
     with progress_reporter(arguments) as reporter, half_made(temporary_folder()) as (folder, _):
         store = writable_store(open_store(reporter), folder / OWN_STORE, reporter)
         run_folder = RunFolder(folder / clip.name)

@@ -40,7 +40,8 @@ class Pairs:
 
     def moments(self, shape: np.ndarray) -> np.ndarray:
         """Moments (M, 3). shape: (S,); unknowns beyond those that move these points are ignored."""
-        return self.moment + self.moment_dirs @ shape[: self.moment_dirs.shape[2]]
+        known = self.moment_dirs.shape[2]
+        return self.moment + (self.moment_dirs.reshape(-1, known) @ shape[:known]).reshape(-1, 3)  # one product, not one a pair
 
     def moments_in(self, chain: Chain, shape: np.ndarray) -> Iterator[np.ndarray]:
         """Moments (M, 3) in each frame of the chain. shape: (S,)."""

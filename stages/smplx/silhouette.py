@@ -38,7 +38,7 @@ class Outline:
     """Signed distance field of one frame's alpha edge, in full-size pixels."""
 
     field: np.ndarray  # (h, w) signed distance px, negative inside
-    slope: np.ndarray  # (h, w, 2) its gradient
+    slope: np.ndarray  # (2, h, w) its gradient, two planes: a view with a stride would be copied at each look
     scale: float
     """Full-size pixels per field pixel."""
     area: float
@@ -58,7 +58,7 @@ class Outline:
             inside &= ~self.hidden[row, column]
         x, y = at[:, 0].reshape(-1, 1), at[:, 1].reshape(-1, 1)
         sample = lambda image: cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0]  # noqa: E731
-        return sample(self.field), np.stack([sample(self.slope[..., c]) for c in (0, 1)], 1), inside
+        return sample(self.field), np.stack([sample(plane) for plane in self.slope], 1), inside
 
 
 def read_outline(path: Path) -> Outline:
@@ -71,7 +71,7 @@ def read_outline(path: Path) -> Outline:
     outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
     inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     field = (cv2.GaussianBlur(outside - inside, (0, 0), 1.0) * scale).astype(np.float32)
-    slope = np.stack([cv2.Sobel(field, cv2.CV_32F, 1, 0, ksize=3), cv2.Sobel(field, cv2.CV_32F, 0, 1, ksize=3)], -1) / (8 * scale)
+    slope = np.stack([cv2.Sobel(field, cv2.CV_32F, 1, 0, ksize=3), cv2.Sobel(field, cv2.CV_32F, 0, 1, ksize=3)]) / (8 * scale)
     return Outline(field, slope, scale, float(mask.mean()), mask)
 
 
