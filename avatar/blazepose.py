@@ -52,14 +52,16 @@ class PoseNetworks:
         self._anchors = anchor_centers(self._detector.width, (8, 16, 32, 32, 32))
 
     def persons(self, image: np.ndarray, threshold: float, within: Region | None = None) -> list[Person]:
-        """image: (H, W, 3) uint8. Persons of at least this score, best first; within: looked for there, else in the whole frame."""
+        """image: (H, W, 3) uint8. Persons of at least this score, best first, whose hips lie at most the image's longer side
+        beside it: empty rooms are taken for giants far outside. within: looked for there, else in the whole frame."""
         size = self._detector.width
         frame = within or full_frame(image.shape[1], image.shape[0])
         raw, logits = self._detector(crop(image, frame, size, outside="black") * 2 - 1)
         found = suppress(decode(raw, logits, self._anchors, size, threshold))
         circles = frame.to_frame(found.points[:, :2])
-        return [Person(around_circle(*circle).scaled(1.25), float(score))
-                for circle, score in zip(circles, found.score, strict=True)]
+        persons = [Person(around_circle(*circle).scaled(1.25), float(score))
+                   for circle, score in zip(circles, found.score, strict=True)]
+        return [person for person in persons if _beside(person.region.center, image) <= max(image.shape[:2])]
 
     def pose(self, image: np.ndarray, region: Region) -> Pose:
         """image: (H, W, 3) uint8. The landmark network on one region."""
@@ -70,6 +72,13 @@ class PoseNetworks:
         world = region.turn(world.reshape(-1, 3)[:POINTS].astype(np.float64))
         return Pose(points[:POINTS], clipped_sigmoid(raw[:POINTS, 3]), clipped_sigmoid(raw[:POINTS, 4]), world, float(score[0]),
                     around_circle(points[HIPS], points[RIM]).scaled(1.25))
+
+
+def _beside(point: tuple[float, float], image: np.ndarray) -> float:
+    """How far a point (x, y) lies outside the image (H, W, 3), px, along the axis along which it is farther."""
+    height, width = image.shape[:2]
+    x, y = point
+    return max(-x, x - width, -y, y - height, 0.0)
 
 
 def refine(points: np.ndarray, heat: np.ndarray, reach: int = 3, least: float = 0.5) -> np.ndarray:

@@ -18,6 +18,9 @@ LARGE_ENOUGH = 640
 """px, height of these pictures, at most: the detector sees 224."""
 LYING = np.radians((60, 120))
 """Lean of a trunk that lies: by 29 degrees it leans in squats, by 36 in a dance, by 76 and more where a camera was held across."""
+STANDING = np.radians(45)
+"""Most lean of the trunk in the turned picture. Where the landmark network takes an empty room for somebody who lies, the turned
+room shows nobody, or somebody who hangs head down."""
 FILTERS: dict[int, list[str]] = {0: [], 1: ["transpose=cclock"], 3: ["transpose=clock"]}
 """ffmpeg's filters for so many quarters, counter-clockwise as seen."""
 
@@ -25,21 +28,32 @@ FILTERS: dict[int, list[str]] = {0: [], 1: ["transpose=cclock"], 3: ["transpose=
 def find_quarters(people: People, pictures: Iterable[np.ndarray]) -> int:
     """0, 1 or 3 quarters, counter-clockwise as seen. pictures: (H, W, 3) uint8 of the footage, spread evenly over it.
 
-    People who lie down in some of the pictures are not turned: most must lie, and to the same side.
+    People who lie down in some of the pictures are not turned: most must lie, to the same side, and stand once turned.
     """
-    leans: list[float] = []
+    told: list[int] = []
     for picture in pictures:
-        lean = people.lean(picture)
-        if lean is None:
+        quarters = _quarters_of(people, picture)
+        if quarters is None:
             continue
-        if not leans and abs(lean) < LYING[0]:
+        if not told and quarters == 0:
             break
-        leans.append(lean)
+        told.append(quarters)
     people.start_anew()
-    for quarters, sign in ((1, 1), (3, -1)):
-        if sum(LYING[0] < sign * lean < LYING[1] for lean in leans) > len(leans) / 2:
-            return quarters
-    return 0
+    return next((quarters for quarters in (1, 3) if told.count(quarters) > len(told) / 2), 0)
+
+
+def _quarters_of(people: People, picture: np.ndarray) -> int | None:
+    """Quarters by which the person of one picture (H, W, 3) stands; None where it shows nobody, or somebody who hangs head down."""
+    lean = people.lean(picture)
+    if lean is None or abs(lean) > LYING[1]:
+        return None
+    if abs(lean) < LYING[0]:
+        return 0
+    quarters = 1 if lean > 0 else 3
+    people.start_anew()
+    after = people.lean(turn(picture, quarters))
+    people.start_anew()
+    return quarters if after is not None and abs(after) < STANDING else None
 
 
 def turn(picture: np.ndarray, quarters: int) -> np.ndarray:

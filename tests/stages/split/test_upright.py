@@ -169,6 +169,17 @@ def test_who_lies_down_in_some_of_the_pictures_is_not_turned_and_who_stands_in_t
     assert find_quarters(people, watched(stands, left, left, left)) == 0 and len(looked) == 1
 
 
+def test_an_empty_room_that_the_network_takes_for_somebody_who_lies_turns_nothing():
+    class SomebodyEverywhere(RedHeads):
+        def lean(self, image):
+            lean = super().lean(image)
+            return lean if lean is not None else 1.5 if image.shape[0] == HEIGHT else 3.0
+
+    people, empty = SomebodyEverywhere({}), np.zeros_like(person())
+    assert find_quarters(people, [empty] * 5) == find_quarters(people, [empty, empty, empty, person(), empty]) == 0
+    assert find_quarters(people, [np.rot90(person()), np.rot90(empty), np.rot90(empty)]) == 3
+
+
 @pytest.mark.parametrize("quarters", [0, 1, 3])
 def test_the_networks_see_on_which_side_a_person_lies(quarters):
     root = Path(os.environ.get("GSAC_CACHE", "~/.cache/gsac")).expanduser()
