@@ -114,7 +114,7 @@ class Options:
     anyway: bool = False
     """Whether the run goes on where nothing can come of the clip."""
     fleeting: bool = False
-    """Whether the folder goes with the run's end: nothing that tells of the run is written into it."""
+    """Whether the folder goes with the run's end, so that run.json, metrics.json and dvc.lock are left out."""
 
 
 class ClipRun:
