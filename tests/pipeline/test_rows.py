@@ -53,8 +53,8 @@ def test_ctrl_c_in_a_forced_run_loses_nothing(toy, everything):
     process = toy.start("run", toy.clip, "--out", toy.out, "--set", "right.pause_s=0.3", "--force", "left", "--force", "right")
     toy.wait_for(lambda: "right" in toy.runs)
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=30)
-    assert process.returncode == 130
+    said = process.communicate(timeout=30)
+    assert process.returncode == 130, said
     assert list(rows(toy)) == everything and metrics(toy) == {"length": 10} and not stale(toy)
 
 
