@@ -83,8 +83,8 @@ class Code(Enum):
     NOT_FITTED = Wording("Not fitted, and not learned from: {frames}; {reason}.", severity=Severity.WRONG)
     PART_HIDDEN = Wording("Something that stands before the person hides {parts}; what is behind it is not fitted to the pictures.",
                           "Film where nothing stands between the person and the camera.")
-    POORLY_COVERED = Wording("The body covers the silhouette badly (IoU below {figure}) in {frames}: wide clothes, a mask that "
-                             "holds more than the person, or several moments in one picture.",
+    POORLY_COVERED = Wording("The body covers the silhouette badly (IoU down to {figure:.2f}) in {frames}: wide clothes, a mask "
+                             "that holds more than the person, or several moments in one picture.",
                              "Wear clothes that lie close to the body, and turn slower.")
     CLOTHES_HIDE_SHAPE = Wording("Clothes hide the body's shape: they stand up to {figure:.0f} cm off it.",
                                  "Wear clothes that lie close to the body.")

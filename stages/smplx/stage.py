@@ -86,7 +86,7 @@ def run(job: Job) -> None:
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = find_lost_frames(fit, seen, sightings.person_height, own)
     params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
-    for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit.iou)):
+    for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit)):
         job.warn(finding)
     if (doubt := doubt_focal(job.config, clip, float(params.focal[0]))) is not None:
         job.warn(doubt)

@@ -52,6 +52,8 @@ class Fit:
     """Sentences for the user."""
     cost: float = np.nan
     """By `lm`, of all but the fingers."""
+    uncovered: np.ndarray | None = None
+    """(T,) area of the alpha beside the body, as a share of the person's height squared; None where it is not measured."""
 
 
 def to_params(body: Body, state: State, center: np.ndarray, expression: np.ndarray | None = None,

@@ -131,14 +131,19 @@ def has_moved(arms: HiddenArms, problem: Problem, chain: Chain, side: int, first
     return bool(unknown and np.linalg.norm(after - before) > MOVED)
 
 
-def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None) -> tuple[State, np.ndarray]:
+def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None,
+                    movable: bool) -> tuple[State, np.ndarray]:
     """The state with doubtful arms in poses that explain points and mask clearly better, where there are any; and (T, 2) bool, the
     doubtful arms that no stay has.
 
-    missing: (T, 2) bool, hands that were not detected; None: all were.
+    missing: (T, 2) bool, hands that were not detected; None: all were; movable: whether the pictures tell one pose of an arm from
+    another, else the arms stay as they are.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     mirrored, calm = find_mirrored(arms, problem, state, missing)
+    if not movable:
+        wrong = find_contradicted(arms, problem, state, missing)
+        return state, wrong | find_untold(arms, problem, state, missing) | mirrored
     state = unmirror(arms, problem, state, mirrored, calm, missing)
     wrong = find_contradicted(arms, problem, state, missing)
     doubtful = wrong | find_untold(arms, problem, state, missing)

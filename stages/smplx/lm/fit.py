@@ -21,7 +21,7 @@ from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
-from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, move, settle_doubtful
+from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, measure_uncovered, move, settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, describe_arms, widen_arm
 from gsac.stages.smplx.lm.hidden_search import search_hidden
@@ -32,6 +32,7 @@ from gsac.stages.smplx.lm.shake import transl_acceleration
 from gsac.stages.smplx.lm.swapped_sides import DEARER, MARGIN, believe_by_faces, propose_by_faces, propose_swapped
 from gsac.stages.smplx.lm.turn_jumps import find_jumps, find_turned_over
 from gsac.stages.smplx.lm.unseen_sway import find_unseen_sway
+from gsac.stages.smplx.lost_frames import is_mostly_loose
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -74,7 +75,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         state, more = problem.minimise(state, config.iterations)
         steps += more
     cost = problem.cost(state)
-    state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing)
+    state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing, movable=not is_mostly_loose(iou))
     doubtful |= moved & ~hidden.mark(len(moved))
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
@@ -86,7 +87,8 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     said += find_unseen_sway(state.local[:, 0], chain.place + state.transl[:, None])
     said += describe_arms(Code.HAND_HIDDEN, hidden.mark(len(sigma))) + describe_arms(Code.ARM_DOUBTFUL, doubtful)
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
-               problem.person_offsets.joint_offset(state.own), tuple(said), cost)
+               problem.person_offsets.joint_offset(state.own), tuple(said), cost,
+               measure_uncovered(hidden, problem, state, np.arange(len(sigma))))
 
 
 def fit_either_side(body: Body, sightings: Sightings, outlines: list[Outline], detector: Detector,

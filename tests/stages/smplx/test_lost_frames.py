@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import LOST, Body, BodyParams
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, is_mostly_loose
 from gsac.stages.smplx.state import Fit
 
 HEIGHT = 1000.0
@@ -22,7 +22,7 @@ def good() -> Fit:
 def said(fit: Fit, seen: np.ndarray | None = None, own: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
     lost = find_lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT, np.ones(10, bool) if own is None else own)
     assert np.sum(list(lost.values()), axis=0).max() <= 1  # one reason a frame
-    return np.any(list(lost.values()), axis=0), [finding.message for finding in describe_lost_frames(lost, fit.iou)]
+    return np.any(list(lost.values()), axis=0), [finding.message for finding in describe_lost_frames(lost, fit)]
 
 
 def test_a_good_fit_loses_nothing_and_says_nothing(good):
@@ -75,6 +75,23 @@ def test_pictures_that_mix_several_moments_of_a_fast_turn_are_named(good):
     iou[[6, 9]] = 0.85
     lost, words = said(replace(good, iou=iou))
     assert not lost.any() and len(words) == 1 and "4 of 10 frames (2, 5-6, 9)" in words[0] and "turn slower" in words[0]
+
+
+def test_a_part_of_the_mask_beside_the_body_is_named_where_two_frames_show_one(good):
+    uncovered = np.zeros(10)
+    uncovered[4] = 0.005
+    assert said(replace(good, uncovered=uncovered))[1] == [], "a single one is no news"
+    uncovered[8] = 0.004
+    lost, words = said(replace(good, uncovered=uncovered))
+    assert not lost.any() and len(words) == 1 and "IoU down to 0.88" in words[0] and "2 of 10 frames (4, 8)" in words[0]
+
+
+@pytest.mark.parametrize("low, mostly", [(5, False), (6, True)])
+def test_pictures_mostly_covered_badly_do_not_tell_where_an_arm_is(low, mostly):
+    iou = np.full(12, np.nan)
+    iou[:10] = 0.92
+    iou[:low] = 0.84
+    assert is_mostly_loose(iou) is mostly and not is_mostly_loose(np.full(3, np.nan))
 
 
 def test_the_mark_is_read_back_from_the_joints_spread():

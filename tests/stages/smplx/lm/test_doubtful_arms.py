@@ -19,6 +19,7 @@ from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, find_untold, s
 from gsac.stages.smplx.lm.fit import fit_points, set_up
 from gsac.stages.smplx.lm.hidden_arms import HiddenArms, Stay, describe_arms, widen_arm
 from gsac.stages.smplx.lm.hidden_search import HIDES, hiding_pose
+from gsac.stages.smplx.state import State
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
 
 FRAMES, ON_BACK = 16, range(5, 11)
@@ -131,13 +132,26 @@ def hand_on_back(body, tmp_path_factory):
                                                                      betas=truth.betas.astype(float))
 
 
-def test_a_hand_that_is_seen_on_the_back_and_fitted_inside_the_trunk_is_moved_to_the_back(hand_on_back):
-    arms, problem, truth = hand_on_back
+def put_inside_trunk(truth: State) -> State:
+    """The state with the hand of the frames on the back inside the trunk."""
     state = replace(truth, local=truth.local.copy())
     for joint, turn in zip((16, 18), rotation.exp(hiding_pose(0, HIDES[1])), strict=True):
         state.local[ON_BACK, joint] = turn
+    return state
+
+
+def test_where_pictures_do_not_tell_poses_apart_an_arm_is_doubted_and_stays(hand_on_back):
+    arms, problem, truth = hand_on_back
+    state = put_inside_trunk(truth)
+    settled, doubtful = settle_doubtful(arms, problem, state, None, movable=False)
+    assert doubtful[ON_BACK, 0].all() and settled is state
+
+
+def test_a_hand_that_is_seen_on_the_back_and_fitted_inside_the_trunk_is_moved_to_the_back(hand_on_back):
+    arms, problem, truth = hand_on_back
+    state = put_inside_trunk(truth)
     with threadpool_limits(1, "blas"):
-        settled, doubtful = settle_doubtful(arms, problem, state, None)
+        settled, doubtful = settle_doubtful(arms, problem, state, None, movable=True)
     wrist = [problem.skeleton.pose(s.local, s.shape).place[ON_BACK, INDEX["left_wrist"]] for s in (truth, state, settled)]
     before, after = (np.linalg.norm(other - wrist[0], axis=-1) for other in wrist[1:])
     assert doubtful[ON_BACK, 0].all() and not doubtful[:, 1].any()
@@ -161,7 +175,7 @@ def test_an_arm_beside_its_points_in_one_frame_is_doubted_only_where_the_body_le
 
 
 def test_an_arm_as_the_pictures_show_it_keeps_still(hand_on_back):
-    state, doubtful = settle_doubtful(*hand_on_back, None)
+    state, doubtful = settle_doubtful(*hand_on_back, None, movable=True)
     assert not doubtful.any() and np.array_equal(state.local, hand_on_back[2].local)
 
 
