@@ -24,7 +24,7 @@ from gsac.stages.findings import Code, Finding, runs_of_frames
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import LEAST_MARGIN, Extent, plan_crop, principal_point, sides_near
-from gsac.stages.split.decoding import Chains
+from gsac.stages.split.decoding import Chains, find_alone
 from gsac.stages.split.keyframes import read_key_frames
 from gsac.stages.split.masks import match_frames, write_masks
 from gsac.stages.split.mirrored import find_mirrored, turn_back
@@ -72,7 +72,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
                        "Copy the file from the phone again, or cut the clip.")
     video = video if people is None else stand_upright(path, video, people, warn)
     looks: list[Look] = []
-    chains = Chains.of(video) if config.quick else None
+    chains = Chains.of(video, find_alone(path, video)) if config.quick else None
 
     def write(picks: np.ndarray, crop: Crop | None) -> Written:
         width, height = frame_size(video, config, crop)

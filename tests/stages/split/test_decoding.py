@@ -15,9 +15,9 @@ from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.stages.contract import Job
 from gsac.stages.split import video
 from gsac.stages.split.config import SplitConfig
-from gsac.stages.split.decoding import NEAR, Chains
+from gsac.stages.split.decoding import NEAR, Chains, find_alone
 from gsac.stages.split.pick import pick_by_time
-from gsac.stages.split.probe import Video
+from gsac.stages.split.probe import Video, probe
 from gsac.stages.split.stage import run
 
 ENCODERS = {
@@ -103,23 +103,39 @@ def test_a_damaged_video_gives_the_same_frames_each_time(tmp_path):
     assert all(np.array_equal(one, frames[0]) for one in frames)
 
 
-def phone(frames: int, every: int) -> Chains:
-    """Of a clip with a key frame `every` so many."""
+def phone(frames: int, every: int, referred: int = 1) -> Chains:
+    """Of a clip with a key frame `every` so many; to one frame of so many `referred` others refer."""
     ticks = np.arange(frames)
-    chains = chains_of(ticks, ticks, ticks[::every])
+    chains = chains_of(ticks, ticks, ticks[::every], ticks % every % referred > 0)
     assert chains is not None
     return chains
 
 
-def chains_of(ticks: np.ndarray, sent: np.ndarray, keys: np.ndarray) -> Chains | None:
-    """As of a video of these times."""
-    return Chains.of(cast(Video, SimpleNamespace(ticks=ticks, sent=sent, key_ticks=keys)))
+def chains_of(ticks: np.ndarray, sent: np.ndarray, keys: np.ndarray, alone: np.ndarray | None = None) -> Chains | None:
+    """As of a video of these times. alone: (N,) bool, frames to which no other refers; None: none."""
+    alone = np.zeros(len(ticks), bool) if alone is None else alone
+    return Chains.of(cast(Video, SimpleNamespace(ticks=ticks, sent=sent, key_ticks=keys)), alone)
+
+
+@pytest.mark.parametrize("kind", ["reordered", "hevc"])
+def test_frames_to_which_no_other_refers_are_not_decoded(tmp_path, decoded, kind):
+    clip = make_clip(tmp_path / "clip.mp4", *ENCODERS[kind])
+    video = probe(clip)
+    alone = find_alone(clip, video)
+    assert 0.3 < alone.mean() < 0.8 and not alone[np.isin(video.ticks, video.key_ticks)].any()
+    split(clip, tmp_path / "quick", quick=True, count=7)
+    assert decoded[0] <= (~alone).sum() + 2, "of those alone the first and the last that are kept at most"
+
+
+def test_of_a_codec_that_the_program_does_not_read_every_frame_may_be_referred_to(tmp_path):
+    clip = make_clip(tmp_path / "clip.avi", "-c:v", "ffv1")
+    assert find_alone(clip, probe(clip)).tolist() == [False] * 120
 
 
 @settings(deadline=None)
-@given(st.integers(1, 700), st.integers(1, 90), st.integers(1, 40))
-def test_moved_frames_stay_near_their_places_and_cost_no_more(frames, every, count):
-    chains, times = phone(frames, every), np.arange(frames) / 30
+@given(st.integers(1, 700), st.integers(1, 90), st.integers(1, 40), st.integers(1, 4))
+def test_moved_frames_stay_near_their_places_and_cost_no_more(frames, every, count, referred):
+    chains, times = phone(frames, every, referred), np.arange(frames) / 30
     picks = pick_by_time(times, None, count)
     moved = chains.move_picks(picks, times)
     assert moved[0] == picks[0] and moved[-1] == picks[-1] and (np.diff(moved) > 0).all()
