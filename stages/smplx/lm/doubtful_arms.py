@@ -141,14 +141,12 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     mirrored, calm = find_mirrored(arms, problem, state, missing)
-    if not movable:
-        wrong = find_contradicted(arms, problem, state, missing)
-        return state, wrong | find_untold(arms, problem, state, missing) | mirrored
-    state = unmirror(arms, problem, state, mirrored, calm, missing)
-    wrong = find_contradicted(arms, problem, state, missing)
-    doubtful = wrong | find_untold(arms, problem, state, missing)
-    state = move(arms, problem, state, doubtful, missing)
-    return move(arms, problem, state, with_stays(arms, mirrored), missing, BARE), doubtful | mirrored
+    state = unmirror(arms, problem, state, mirrored, calm, missing) if movable else state
+    doubtful = find_contradicted(arms, problem, state, missing) | find_untold(arms, problem, state, missing)
+    if movable:
+        state = move(arms, problem, state, doubtful, missing)
+        state = move(arms, problem, state, with_stays(arms, mirrored), missing, BARE)
+    return state, doubtful | mirrored
 
 
 def with_stays(arms: HiddenArms, mirrored: np.ndarray) -> np.ndarray:
