@@ -18,7 +18,7 @@ from gsac.stages.smplx.detector_errors import find_errors
 from gsac.stages.smplx.expression import translate_expression, translate_rest
 from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
-from gsac.stages.smplx.lm.hiding_clothes import fit_under_clothes
+from gsac.stages.smplx.lm.misleading_outlines import fit_unmisled
 from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
@@ -40,7 +40,7 @@ FOCAL = 0.6, 3.0
 """Focal lengths of phones' lenses over the longer side of the picture; the main ones' are 0.8 to 1.1, of three times zoom 3."""
 KEPT = 0.05
 """Relative difference up to which the fit has a given focal length: its prior is 0.2 % wide."""
-METHODS = {"lm": fit_under_clothes, "paper": fit_as_published, "brought": take_as_fit}
+METHODS = {"lm": fit_unmisled, "paper": fit_as_published, "brought": take_as_fit}
 """smplx.method -> fit; config.METHODS are the same names."""
 BETAS = {"lm": 20, "paper": 100}
 """Leading betas that a method solves: later ones have a small variance, which one clip cannot determine, and the paper's fit has as

@@ -26,12 +26,15 @@ main and tele lenses, costs at most 1.014 times as much as the found one; one th
 
 
 def fit_with_doubt(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
-                   progress: Callable[[int, int, str], None]) -> Fit:
-    """Fits the clip; where an unusual focal length was given, once more without it, and takes what explains the pictures better."""
-    fit = fit_clip(body, sightings, outlines, config, progress)
+                   progress: Callable[[int, int, str], None], arms_told: bool = True) -> Fit:
+    """Fits the clip; where an unusual focal length was given, once more without it, and takes what explains the pictures better.
+
+    arms_told: of `fit_clip`.
+    """
+    fit = fit_clip(body, sightings, outlines, config, progress, arms_told)
     given = config.focal_px or sightings.focal_px
     free = replace(sightings, focal_px=None), replace(config, focal_px=None)
     if not given or USUAL[0] <= given / focal_prior(*free)[0] <= USUAL[1]:
         return fit
-    found = fit_clip(body, free[0], outlines, free[1], progress)
+    found = fit_clip(body, free[0], outlines, free[1], progress, arms_told)
     return found if found.cost < CHEAPER * fit.cost else fit

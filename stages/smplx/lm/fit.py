@@ -32,7 +32,6 @@ from gsac.stages.smplx.lm.shake import transl_acceleration
 from gsac.stages.smplx.lm.swapped_sides import DEARER, MARGIN, believe_by_faces, propose_by_faces, propose_swapped
 from gsac.stages.smplx.lm.turn_jumps import find_jumps, find_turned_over
 from gsac.stages.smplx.lm.unseen_sway import find_unseen_sway
-from gsac.stages.smplx.lost_frames import is_mostly_loose
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
 from gsac.stages.smplx.silhouette import Outline, sample_outlines
@@ -53,14 +52,21 @@ VIEW = np.radians(30)
 
 
 def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
-             progress: Callable[[int, int, str], None]) -> Fit:
-    """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps."""
+             progress: Callable[[int, int, str], None], arms_told: bool = True) -> Fit:
+    """Fits all frames at once. T may be 1; temporal terms need 3 frames and timestamps.
+
+    arms_told: whether the pictures tell one pose of an arm from another; else arms that are hidden or in doubt are named, but stay
+    where they are.
+    """
     detector = Detector.load(sightings.detector, body)
     sightings, problem, state, steps, said = fit_either_side(body, sightings, outlines, detector, config)
     hidden = HiddenArms.of(body, sightings.person_height)
-    state, moved = move_contradicted(hidden, problem, state, sightings.missing)
+    moved = np.zeros((len(sightings.xy), 2), bool)
+    if arms_told:
+        state, moved = move_contradicted(hidden, problem, state, sightings.missing)
     hidden.find(problem, state, sightings.missing)
-    state = search_hidden(hidden, problem, state)
+    if arms_told:
+        state = search_hidden(hidden, problem, state)
     iou = np.full(len(sightings.xy), np.nan)
     problem.outline_weight, problem.limit, problem.seen.depth_spread = config.silhouette, ROBUST, ROUNDS_DEPTH_SPREAD
     for r in range(config.rounds):
@@ -75,7 +81,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         state, more = problem.minimise(state, config.iterations)
         steps += more
     cost = problem.cost(state)
-    state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing, movable=not is_mostly_loose(iou))
+    state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing, movable=arms_told)
     doubtful |= moved & ~hidden.mark(len(moved))
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
