@@ -13,6 +13,8 @@ from gsac.benchmarks.stability.take import Take
 
 LEAST_FRAMES = 3
 """Frames that are left of the person's back, at least."""
+RIM = 3
+"""px about the mask that may still show the person."""
 Touched = tuple[Take, np.ndarray]
 """A take, and the frames (T,) bool that were touched."""
 
@@ -66,12 +68,16 @@ def show_back(take: Take, degrees: float, rng: np.random.Generator) -> Touched:
 
 
 def paint_scene(take: Take) -> np.ndarray:
-    """The scene without the person, (H, W, 3) uint8: each pixel's median over frames in which it is free."""
+    """The scene without the person, (H, W, 3) uint8: each pixel's median over frames in which it is free. What never is goes on
+    from around it: nothing of the person is left there.
+    """
+    rim = np.ones((2 * RIM + 1, 2 * RIM + 1), np.uint8)
     frames = take.frames.astype(np.float32)
-    frames[take.masks] = np.nan
-    empty = np.isnan(frames).all(0)
-    frames[0][empty] = take.frames[:, empty].mean(0)
-    return np.nanmedian(frames, axis=0).round().astype(np.uint8)
+    frames[np.stack([cv2.dilate(mask.astype(np.uint8), rim) > 0 for mask in take.masks])] = np.nan
+    unseen = np.isnan(frames[..., 0]).all(0)
+    frames[0][unseen] = 0
+    scene = np.nanmedian(frames, axis=0).round().astype(np.uint8)
+    return cv2.inpaint(scene, unseen.astype(np.uint8), RIM, cv2.INPAINT_TELEA)
 
 
 def _angle(take: Take, axis: int, pixel: float) -> float:

@@ -102,6 +102,13 @@ def test_nothing_is_asked_of_pictures_that_show_another_time_or_nobody():
         assert not changed.asked[touched].any() and changed.asked[~touched].all()
 
 
+def test_pictures_without_the_person_show_nothing_of_the_person_even_where_no_picture_shows_the_scene():
+    take = make_take()
+    assert take.masks.all(0).any()
+    changed, touched = FAULTS["no-person"].inject(take, 3, 0)
+    assert changed.frames[touched].max() < 120 and not changed.masks[touched].any()
+
+
 def test_a_picture_out_of_order_keeps_its_own_truth():
     changed, touched = FAULTS["out-of-order"].inject(make_take(), 3, 0)
     clean = make_take()

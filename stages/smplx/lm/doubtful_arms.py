@@ -1,9 +1,9 @@
 """Arms that the pictures contradict, or do not tell: they are said, and moved where another pose is clearly right.
 
-An arm is doubtful where its points lie elsewhere for some frames, or in one in which the mask shows a limb that the body does not
-cover, where its hand is seen although it lies inside the trunk, where its hand has moved while nothing told where it was, or where
-its hand is out of sight for more of a turn than a trunk covers. Its path is then searched among all that arms can do; one that
-explains the pictures much better takes its place.
+An arm is doubtful where its points lie elsewhere for some frames, far off in one, or in one in which the mask shows a limb that the
+body does not cover, where its hand is seen although it lies inside the trunk, where its hand has moved while nothing told where it
+was, or where its hand is out of sight for more of a turn than a trunk covers. Its path is then searched among all that arms can do;
+one that explains the pictures much better takes its place.
 T frames; sides are 0 left, 1 right.
 """
 
@@ -40,8 +40,8 @@ from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.state import State, to_params
 
 FAR, ASTRAY, DOUBTS = 4.5, 2.5, 3
-"""Of doubtful arms: spreads from a point, in frames that may lie a little apart (3.4 in clean turns) and in frames on end (1.9; 3.2
-with a hand on the back that is taken for one before the belly), and frames."""
+"""Of doubtful arms: spreads from a point, in any frame (3.5 at most in clean turns, 5.3 with a hand on the hip seen from behind),
+and in so many frames on end (1.9; 3.2 with a hand on the back that is taken for one before the belly)."""
 ALONE, BESIDE, UNCOVERED = 3.0, 0.02, 0.0012
 """Of an arm that is doubtful in one frame: spreads from a point; distance from the body, and area beyond it, of the mask's part
 that the body leaves, as shares of the person's height and its square. An arm on its way to hip or hair is 3.4 on off and leaves
@@ -74,7 +74,9 @@ def find_contradicted(arms: HiddenArms, problem: Problem, state: State, missing:
     for side in (0, 1):
         arm = off[:, [ELBOW[side], WRIST[side]]].max(1)
         sunk = ~missing[:, side] & np.isfinite(find_near(arms, state, chain, side))
-        for first, last in [*bridge(arm > FAR), *bridge(arm > ASTRAY, 0), *bridge(sunk, 0)]:
+        for first, last in bridge(arm > FAR):
+            out[first:last, side] = True
+        for first, last in [*bridge(arm > ASTRAY, 0), *bridge(sunk, 0)]:
             out[first:last, side] |= last - first >= DOUBTS
         far = np.flatnonzero(arm > ALONE)
         out[far, side] |= measure_uncovered(arms, problem, state, far) > UNCOVERED

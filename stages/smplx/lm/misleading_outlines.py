@@ -1,8 +1,8 @@
 """Outlines that tell little of the body: of clothes that hide the figure, and of pictures that the body does not fit.
 
 Skirts and hoodies drive the figure's betas to where no person is. Where pictures mix several moments, are compressed to blocks or
-show a tiny person, outlines lie beside the body in most frames; they spread its legs, and arms that are looked for by them are found
-where they are not. Then the key points tell the pose, and the outline hardly.
+show a tiny person, outlines lie beside the body in most frames; they spread its legs, and arms that are looked for by them are
+found where they are not. Then the key points tell the pose, and the outline hardly.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ WEAK = 0.05
 
 def fit_unmisled(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
                  progress: Callable[[int, int, str], None]) -> Fit:
-    """Fits the clip; where outlines mislead, once more with little weight on them. Where they fit the body in few frames, arms stay."""
+    """Fits the clip; where outlines mislead, once more with little weight on them; arms stay where few frames fit the body."""
     fit = fit_with_doubt(body, sightings, outlines, config, progress)
     figure, clothes = np.split(fit.state.betas, [body.num_figure])
     thickest = max((cm for cm, name in zip(clothes, body.clothes, strict=True) if name not in NO_CLOTHES), default=0.0)

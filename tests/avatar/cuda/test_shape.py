@@ -73,7 +73,7 @@ def test_expression_and_joints_take_the_vertices_gradient_as_on_the_cpu(both, ba
 
 def test_a_training_follows_the_cpus(both):
     from gsac.benchmarks.gpu.check import relative
-    from gsac.stages.train.fast.trainer import Trainer
+    from gsac.stages.train.fast.trainer import Step, Trainer
     from gsac.stages.train.views import View
 
     trainer, task, made, gaussians = both(steps=24)
@@ -81,7 +81,7 @@ def test_a_training_follows_the_cpus(both):
     cpu.offsets = None
     for step in range(24):
         t = int(trainer.order[step, 0])
-        losses.append(cpu.step(t, View(made.shots[t].camera, made.shots[t].pixels, (0, 0)), step / 24, backgrounds[step], step))
+        losses += cpu.learn([Step(t, View(made.shots[t].camera, made.shots[t].pixels, (0, 0)), step / 24, backgrounds[step], step)])
     trainer.train(24)
     np.testing.assert_allclose(trainer.losses()[:, 0], losses, rtol=0.02)
     assert relative(trainer.expressions(), task.poses.expression) < 0.2

@@ -86,7 +86,7 @@ def test_a_wrist_seen_elsewhere_for_some_frames_makes_its_arm_doubtful(fitted):
     assert np.flatnonzero(found[:, 0]).tolist() == [2, 3, 4, 5, 6] and not found[:, 1].any()
 
 
-def test_an_arm_on_end_beside_its_points_is_doubtful_and_in_single_frames_is_not(fitted):
+def test_an_arm_beside_its_points_is_doubtful_on_end_or_far_off_and_a_little_in_single_frames_is_not(fitted):
     arms, problem, state = fitted
     xy, spread, elbow = problem.seen.xy, problem.seen.spread, POINT["left_elbow"]
     problem.seen.xy = problem.project(state, problem.locate_points(problem.skeleton.pose(state.local, state.shape), state))
@@ -94,8 +94,11 @@ def test_an_arm_on_end_beside_its_points_is_doubtful_and_in_single_frames_is_not
     problem.seen.spread[:, elbow] = 2.0
     problem.seen.xy[[2, 3, 4, 8, 11], elbow] += (6.4, 0)
     found = find_contradicted(arms, problem, state, NONE)
-    problem.seen.xy, problem.seen.spread = xy, spread
     assert np.flatnonzero(found[:, 0]).tolist() == [2, 3, 4] and not found[:, 1].any()
+    problem.seen.xy[8, elbow] += (3.2, 0)
+    far = find_contradicted(arms, problem, state, NONE)
+    problem.seen.xy, problem.seen.spread = xy, spread
+    assert np.flatnonzero(far[:, 0]).tolist() == [2, 3, 4, 8] and not far[:, 1].any()
 
 
 @pytest.mark.parametrize("bend, told, doubted", [(1.5, False, True), (1.5, True, False), (0.1, False, False)])

@@ -16,6 +16,15 @@ def figure():
     return figure(4, 101, 67, 3000)
 
 
+@pytest.fixture
+def one_at_a_time(monkeypatch):
+    """The CPU works out one step at a time, as the GPU does, not two side by side."""
+    from gsac.stages.train.fast import cpu, trainer
+
+    for module in (cpu, trainer):
+        monkeypatch.setattr(module, "AT_ONCE", 1)
+
+
 @pytest.mark.parametrize("exposure", [False, True])
 def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     from dataclasses import replace
@@ -119,7 +128,7 @@ def turning(holdout=(), size=(101, 67), **values):
                 Poses(body, params), TrainConfig(**values), lambda *args: None)
 
 
-def test_rounds_that_move_the_poses_end_as_with_the_cpus_learning():
+def test_rounds_that_move_the_poses_end_as_with_the_cpus_learning(one_at_a_time):
     from gsac.benchmarks.gpu.check import relative
     from gsac.stages.train.fast import prealign
     from gsac.stages.train.fast.cpu import Cpu
@@ -154,12 +163,15 @@ def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_
     assert abs(quality - target) < 0.3
 
 
-def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu():
+def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, monkeypatch):
     from gsac.benchmarks.gpu.check import relative
+    from gsac.stages.train.fast import cpu, schedule
     from gsac.stages.train.fast.cpu import Cpu
     from gsac.stages.train.fast.cuda import Cuda
     from gsac.stages.train.judge.heldout import judge
 
+    monkeypatch.setattr(cpu, "MIDWAY", 0.1)  # the CPU still sees half the size then, as of a large person
+    monkeypatch.setattr(schedule, "MIDWAY", 0.1)
     found = []
     for backend in (Cuda(), Cpu()):
         task = turning((5,), steps=300, gaussians=2000)
