@@ -77,7 +77,7 @@ def paint_scene(take: Take) -> np.ndarray:
     unseen = np.isnan(frames[..., 0]).all(0)
     frames[0][unseen] = 0
     scene = np.nanmedian(frames, axis=0).round().astype(np.uint8)
-    return cv2.inpaint(scene, unseen.astype(np.uint8), RIM, cv2.INPAINT_TELEA)
+    return cv2.inpaint(scene, np.asarray(unseen, np.uint8), RIM, cv2.INPAINT_TELEA)
 
 
 def _angle(take: Take, axis: int, pixel: float) -> float:
