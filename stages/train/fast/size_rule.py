@@ -29,12 +29,15 @@ class SizeScore:
 
 
 def choose(scores: list[SizeScore]) -> SizeScore:
-    """The smallest size within one standard error of the best in PSNR (at most `MOST_LOST`) and detail (at least `DETAIL_LOST`)."""
+    """The smallest size within one standard error of the best in PSNR (at most `MOST_LOST`), and of the sharpest of these in detail
+    (at least `DETAIL_LOST`): where frame and pose disagree a little, blur has the best PSNR. One frame has no standard error.
+    """
     best = max(scores, key=lambda r: np.mean(r.psnr_fg))
-    least = np.mean(best.psnr_fg) - min(standard_error(best.psnr_fg), MOST_LOST)
-    least_detail = np.mean(best.detail) - max(standard_error(best.detail), DETAIL_LOST * np.mean(best.detail))
-    good = [r for r in scores if np.mean(r.psnr_fg) >= least and np.mean(r.detail) >= least_detail]
-    return min(good, key=lambda r: r.n_gaussians)
+    lost = min(standard_error(best.psnr_fg), MOST_LOST) if len(best.psnr_fg) > 1 else MOST_LOST
+    near = [r for r in scores if np.mean(r.psnr_fg) >= np.mean(best.psnr_fg) - lost]
+    sharpest = max(near, key=lambda r: np.mean(r.detail))
+    least = np.mean(sharpest.detail) - max(standard_error(sharpest.detail), DETAIL_LOST * np.mean(sharpest.detail))
+    return min((r for r in near if np.mean(r.detail) >= least), key=lambda r: r.n_gaussians)
 
 
 def optimism(scores: list[SizeScore]) -> float:

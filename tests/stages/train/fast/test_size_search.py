@@ -105,6 +105,21 @@ def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywher
     assert figures["size_frames"] == figures["heldout_frames"], "a short clip needs its frames for training"
 
 
+def test_a_blurred_size_is_not_chosen_though_its_psnr_is_the_best():
+    frames = [-0.4, 0.4, 0.0, 0.0]
+    sharp = SizeScore(9000, [25.0 + f for f in frames], [0.74] * 4)
+    blurred = SizeScore(4500, [25.1 + f for f in frames], [0.58] * 4)
+    assert choose([sharp, blurred]) is sharp
+    assert choose([sharp, SizeScore(6000, blurred.psnr_fg, [0.72] * 4), blurred]).n_gaussians == 6000
+
+
+def test_a_single_frame_tells_no_sizes_apart_by_a_tenth_of_a_decibel():
+    sizes = [SizeScore(9000, [23.35], [0.74]), SizeScore(6000, [23.42], [0.63]), SizeScore(4500, [23.45], [0.58])]
+    assert choose(sizes) is sizes[0]
+    assert choose([*sizes, SizeScore(2000, [23.9], [0.5])]).n_gaussians == 2000, "by more than a quarter they do"
+
+
+
 @pytest.mark.slow
 def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job_anywhere, monkeypatch):
     monkeypatch.setattr(size_search, "list_sizes", lambda largest: (500, 60))
