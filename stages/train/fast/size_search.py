@@ -63,8 +63,8 @@ def search(task: Task, backend: Backend) -> Fit:
     best = choose(scores)
     figures = {"size_curve": [asdict(score) | score.means() | {"chosen": score is best} for score in scores],
                "size_rule": f"smallest within one standard error, and {MOST_LOST} dB, of the best psnr_fg of size_frames, their "
-                            "poses moved to the images, and as sharp; size_optimism: by how many dB these frames flatter the "
-                            "choice, since it was made by them; other heldout_frames do not",
+                            "poses moved to the images, and as sharp as the sharpest of these; size_optimism: by how many dB "
+                            "these frames flatter the choice, since it was made by them; other heldout_frames do not",
                "size_frames": task.choosing.tolist(), "size_optimism": optimism(scores)}
     taken = scores.index(best)
     return replace(fits[taken], figures=figures, smaller=fits[taken + 1:])

@@ -119,7 +119,6 @@ def test_a_single_frame_tells_no_sizes_apart_by_a_tenth_of_a_decibel():
     assert choose([*sizes, SizeScore(2000, [23.9], [0.5])]).n_gaussians == 2000, "by more than a quarter they do"
 
 
-
 @pytest.mark.slow
 def test_a_long_clip_is_judged_on_frames_that_did_not_choose(job_anywhere, monkeypatch):
     monkeypatch.setattr(size_search, "list_sizes", lambda largest: (500, 60))
