@@ -58,6 +58,10 @@ class Code(Enum):
                               "Show both hands, fingers apart.")
     HAND_MISPLACED = Wording("The {side} hand was detected in a wrong place in {frames}; those detections are not used.")
     HAND_NOT_FILLED = Wording("The {side} hand is missing in {frames}, too long to fill.", "Keep the hands in sight.")
+    POINTS_MISSING = Wording("keypoints.npz lacks {frames}; nothing counts as seen there.", "Run keypoints again, or bring all "
+                             "points.", Severity.WRONG)
+    MASK_MISSING = Wording("The mask of {frames} is missing; the body is fitted to the points alone there.",
+                           "Run segment again, or bring all masks.", Severity.WRONG)
     EMPTY_MASK = Wording("No person is in {frames}; the mask there is empty.")
     OTHER_SCENE = Wording("The plate does not show the scene of {frames} (did the camera move?); it is not used there.")
     CAMERA_MOVES = Wording("The camera moves by up to {figure:.0f} px, in {frames}.",
@@ -94,7 +98,7 @@ class Code(Enum):
                            "Let the arms hang a little away from the body, hands in sight.")
     LEGS_DOUBTFUL = Wording("The person sways over the feet, which is hardly seen along the view: there the feet may be off by "
                             "{figure:.0f} cm in {frames}.", "Turn with small steps, hips over the feet.")
-    MASK_NOT_TRAINED = Wording("The mask is empty in {frames}; not trained on.")
+    MASK_NOT_TRAINED = Wording("The mask is empty or missing in {frames}; not trained on.")
     POSE_NOT_TRAINED = Wording("The body could not be fitted in {frames}; not trained on, not judged.")
     NOT_MEASURED = Wording("No frame is held out (usable frames: {figure}, train.holdout is {holdout}): the quality of this avatar "
                            "is not measured.", severity=Severity.NEWS)

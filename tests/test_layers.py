@@ -21,7 +21,8 @@ BELOW = {
     "benchmarks": {"avatar", "cache", "pipeline", "stages", "turntable", "unity", "viewer"},
 }
 """Package -> those it may import; lowest first."""
-SHARED_BY_STAGES = {"contract", "body_choice", "brought_file", "counting", "findings", "first_look", "frame_names", "severity"}
+SHARED_BY_STAGES = {"contract", "body_choice", "brought_file", "counting", "findings", "first_look", "frame_names",
+                    "missing_frames", "severity"}
 
 
 def modules(package: str) -> dict[str, Path]:

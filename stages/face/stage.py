@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_arrays
+from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS
 from gsac.avatar.threads import available_cores
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.contract import Job, StageError
+from gsac.stages.contract import Job
 from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sigma, solve
 from gsac.stages.face.config import ENCODER
 from gsac.stages.face.deca import EXPRESSION, JAW, SHAPE, DecaEncoder
@@ -20,6 +20,7 @@ from gsac.stages.face.head import HeadModel
 from gsac.stages.face.landmarks import TwoMeshes, align, read_averaged
 from gsac.stages.face.resting_face import find_resting_face
 from gsac.stages.findings import Code, Finding
+from gsac.stages.missing_frames import read_keypoints
 
 NOSE, EARS = INDEX["nose"], [INDEX["left_ear"], INDEX["right_ear"]]
 DOUBT = 0.1
@@ -31,10 +32,7 @@ MOST_THREADS = 8
 def run(job: Job) -> None:
     clip = Clip.read(job.inputs["split/clip.json"])
     paths = frame_paths(job.inputs["split/frames"])
-    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
-    if len(keypoints["score"]) != len(paths):
-        raise StageError(f"keypoints.npz has {len(keypoints['score'])} frames but split has {len(paths)}; "
-                         "run keypoints again")
+    keypoints, _ = read_keypoints(job.inputs["keypoints/keypoints.npz"], len(paths))
     actions, flame = Actions.load(), FlameHead.of(job)
     landmarks, points, direction = read_clip(job, paths, keypoints, actions)
     valid = np.isfinite(landmarks[:, 0, 0])

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import Clip, check_keypoints, write_arrays
+from gsac.avatar.artifacts import Clip, write_arrays
 from gsac.avatar.wholebody import HANDS
-from gsac.stages.contract import Job, StageError
+from gsac.stages.contract import Job
 from gsac.stages.findings import Code, Finding
 from gsac.stages.handgap.fill import fill_gaps
 from gsac.stages.handgap.missing_hands import SIDES, MissingHands, find_missing, leave_all, runs
 from gsac.stages.handgap.paper_rule import find_missing_as_paper
 from gsac.stages.handgap.sigma import detection_sigma, person_height
+from gsac.stages.missing_frames import read_keypoints
 
 RULES = {"places": find_missing, "paper": find_missing_as_paper}
 """handgap.rule -> the function that finds missing hands."""
@@ -21,15 +22,13 @@ FILLED_SCORE = 0.5
 
 
 def run(job: Job) -> None:
-    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
     clip = Clip.read(job.inputs["split/clip.json"])
+    times = None if clip.timestamps_s is None else np.asarray(clip.timestamps_s)
+    keypoints, lacking = read_keypoints(job.inputs["keypoints/keypoints.npz"], None if times is None else len(times))
+    if lacking.any():
+        job.warn(Finding.of(Code.POINTS_MISSING, lacking))
     xy = keypoints["xy"].astype(np.float64)
     score = keypoints["score"].astype(np.float64)
-    times = None if clip.timestamps_s is None else np.asarray(clip.timestamps_s)
-    if times is not None and len(times) != len(xy):
-        raise StageError(f"keypoints.npz holds {len(xy)} frames and clip.json {len(times)} timestamps; "
-                         "run both stages again")
-
     own = clip.shows_own_moment(len(xy))
     score = np.where(np.isfinite(xy).all(axis=2) & own[:, None], score, 0)
     xy = np.nan_to_num(xy)

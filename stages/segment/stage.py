@@ -11,7 +11,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, check_keypoints, frame_paths, read_frame, write_alpha, write_image
+from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_alpha, write_image
 from gsac.avatar.camera_motion import View, find_moved, make_view, measure_sway
 from gsac.avatar.onnx_network import NetworkError
 from gsac.avatar.sapiens import Sapiens
@@ -19,6 +19,7 @@ from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
+from gsac.stages.missing_frames import read_keypoints
 from gsac.stages.segment.brought import MASKS, hand_on
 from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
@@ -65,9 +66,7 @@ class Cutout(NamedTuple):
 def run(job: Job) -> None:
     frames = job.inputs["split/frames"]
     paths = frame_paths(frames)
-    keypoints = check_keypoints(job.inputs["keypoints/keypoints.npz"])
-    if len(paths) != len(keypoints["xy"]):
-        raise StageError(f"{len(paths)} frames and keypoints of {len(keypoints['xy'])}; run keypoints again")
+    keypoints, _ = read_keypoints(job.inputs["keypoints/keypoints.npz"], len(paths))
     clip = Clip.read(job.inputs["split/clip.json"])
     (job.out / "alpha").mkdir()
     if job.config.method == "brought":

@@ -63,7 +63,11 @@ class Outline:
 
 def read_outline(path: Path) -> Outline:
     """Makes the field of one alpha EXR."""
-    alpha = read_alpha(path)
+    return make_outline(read_alpha(path))
+
+
+def make_outline(alpha: np.ndarray) -> Outline:
+    """Makes the field of one alpha, (H, W) in 0..1."""
     scale = max(alpha.shape[0] / FIELD_HEIGHT, 1.0)
     size = (max(2, round(alpha.shape[1] / scale)), max(2, round(alpha.shape[0] / scale)))
     small = cv2.resize(alpha, size, interpolation=cv2.INTER_AREA)
@@ -75,10 +79,11 @@ def read_outline(path: Path) -> Outline:
     return Outline(field, slope, scale, float(mask.mean()), mask)
 
 
-def read_outlines(paths: list[Path]) -> list[Outline]:
-    """Makes the fields of a clip's alpha EXRs."""
+def read_outlines(paths: list[Path | None], height: int, width: int) -> list[Outline]:
+    """Makes the fields of a clip's alpha EXRs. paths: (T,) None for a frame of nobody; height, width: of the frames, px."""
+    nobody = make_outline(np.zeros((height, width), np.float32))
     with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(read_outline, paths))
+        return list(pool.map(lambda path: nobody if path is None else read_outline(path), paths))
 
 
 def sample_outlines(body: Body, params: BodyParams, width: int, height: int,

@@ -13,6 +13,7 @@ from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
+from gsac.stages.missing_frames import pair_masks
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import find_errors
 from gsac.stages.smplx.expression import translate_expression, translate_rest
@@ -61,9 +62,12 @@ def run(job: Job) -> None:
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
-    outlines = read_outlines(frame_paths(job.inputs["segment/alpha"]))
-    if len(outlines) != len(sightings.xy):
-        raise StageError(f"{len(outlines)} alpha images but {len(sightings.xy)} frames of key points")
+    masks = pair_masks([path.stem for path in frame_paths(job.inputs["split/frames"])], job.inputs["segment/alpha"])
+    if len(masks) != len(sightings.xy):
+        raise StageError(f"{len(masks)} frames but {len(sightings.xy)} of key points; run handgap again")
+    if None in masks:
+        job.warn(Finding.of(Code.MASK_MISSING, np.array([mask is None for mask in masks])))
+    outlines = read_outlines(masks, clip.height, clip.width)
     own = clip.shows_own_moment(len(outlines))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
     sightings = replace(sightings, start=bring_start(job, body, sightings, outlines))

@@ -41,7 +41,7 @@ FLAT = 6
 BLURRED = 0.65
 """Sharpness below which a picture is blurred: it is 0.5 where one half as large holds all that it holds, and from 0.67 on in
 filmed ones."""
-SOFTER = 0.75
+SOFTER = 0.7
 """Share of the clip's own sharpness, across or along, below which a frame moved or lost its focus."""
 SHARPEST = 90
 """Percentile of the frames that stands for the clip's own sharpness."""

@@ -14,6 +14,7 @@ from gsac.avatar.artifacts import frame_paths, read_alpha, read_frame
 from gsac.avatar.camera import Camera
 from gsac.avatar.threads import available_cores, side_by_side
 from gsac.stages.contract import StageError
+from gsac.stages.missing_frames import pair_masks
 from gsac.stages.train.edge_colour import unmix
 
 MARGIN = 0.06
@@ -90,16 +91,17 @@ def read_views(frames: Path, alphas: Path, camera: Camera, height: int | None, m
 
     Returns the views and the indices of those whose mask is empty. Raises StageError for masks that do not fit the frames.
     """
-    paths = pair_masks(frames, alphas)
+    paths = frame_paths(frames)
+    masks = pair_masks([path.stem for path in paths], alphas)
 
-    def read(pair: tuple[Path, Path]) -> tuple[View, bool]:
+    def read(pair: tuple[Path, Path | None]) -> tuple[View, bool]:
         view, share = _read_view(*pair, camera, height, mixed)
         if share < LEAST_SHARE or not (view.pixels[..., 3] > FAINT).any():
             return view.crop(0, 0, 1, 1), False
         return cut_to_seen(person_crop(view), occluder), True
 
     with ThreadPoolExecutor(available_cores()) as pool:
-        found = list(pool.map(read, paths))
+        found = list(pool.map(read, zip(paths, masks, strict=True)))
     return [view for view, _ in found], [t for t, (_, shown) in enumerate(found) if not shown]
 
 
@@ -110,30 +112,22 @@ def read_whole(frames: Path, alphas: Path, camera: Camera, chosen: Iterable[int]
 
     Raises StageError for masks that do not fit the frames.
     """
-    paths = pair_masks(frames, alphas)
+    paths = frame_paths(frames)
+    masks = pair_masks([path.stem for path in paths], alphas)
     wanted = [int(t) for t in chosen]
 
     def read(t: int) -> View:
-        return cut_to_seen(_read_view(*paths[t], camera)[0], occluder)
+        return cut_to_seen(_read_view(paths[t], masks[t], camera)[0], occluder)
 
     with ThreadPoolExecutor(available_cores()) as pool:
         return dict(zip(wanted, pool.map(read, wanted), strict=True))
 
 
-def pair_masks(frames: Path, alphas: Path) -> list[tuple[Path, Path]]:
-    """(T,) the files of each frame and its mask, from the folders. Raises StageError for a frame without a mask."""
-    masks = {p.stem: p for p in frame_paths(alphas)}
-    paths = frame_paths(frames)
-    for path in paths:
-        if path.stem not in masks:
-            raise StageError(f"{alphas}: no mask for frame {path.name}; run segment again")
-    return [(path, masks[path.stem]) for path in paths]
-
-
-def _read_view(path: Path, mask: Path, camera: Camera, height: int | None = None,
+def _read_view(path: Path, mask: Path | None, camera: Camera, height: int | None = None,
                mixed: bool = False) -> tuple[View, float]:
-    """The frame cut out with its mask, at most `height` px high, and the share of it that the mask covers."""
-    rgb, alpha = read_frame(path), read_alpha(mask)
+    """The frame cut out with its mask (None: of nobody), at most `height` px high, and the share of it that the mask covers."""
+    rgb = read_frame(path)
+    alpha: np.ndarray = np.zeros(rgb.shape[:2], np.float32) if mask is None else read_alpha(mask)
     if alpha.shape != rgb.shape[:2]:
         raise StageError(f"{mask}: mask is {alpha.shape[1]}x{alpha.shape[0]} px, its frame {rgb.shape[1]}x{rgb.shape[0]}")
     if not np.isfinite(alpha).all():

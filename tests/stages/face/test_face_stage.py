@@ -52,8 +52,8 @@ def test_a_face_that_is_never_seen_rests_with_a_warning(tmp_path, store):
 
 
 def test_keypoints_of_another_clip_are_refused(tmp_path, store):
-    with pytest.raises(StageError, match="keypoints.npz has 2 frames but split has 3"):
-        run_face(unseen(tmp_path, 3, 2), tmp_path, store)
+    with pytest.raises(StageError, match="keypoints.npz holds 3 frames, and the clip has 2"):
+        run_face(unseen(tmp_path, 2, 3), tmp_path, store)
 
 
 @pytest.mark.footage

@@ -90,13 +90,14 @@ def put_on_other(person: Person, side: str, first: int, last: int, wrist=True, s
     return person
 
 
-def through_stage(person: Person, folder, photos=False, repeated=(), **config):
-    """Returns the stage's arrays and warnings."""
+def through_stage(person: Person, folder, photos=False, repeated=(), said=None, **config):
+    """Returns the stage's arrays and warnings. said: frames of the keypoints; None: all."""
     folder.mkdir(exist_ok=True)
     source, out = folder / "keypoints.npz", folder / "out"
     out.mkdir()
-    write_arrays(source, **blank(KEYPOINT_SHAPES, T=len(person.xy)) | {
-        "xy": person.xy.astype(np.float32), "score": person.score.astype(np.float32), "world": person.world.astype(np.float32),
+    write_arrays(source, **blank(KEYPOINT_SHAPES, T=len(person.xy[:said])) | {
+        "xy": person.xy[:said].astype(np.float32), "score": person.score[:said].astype(np.float32),
+        "world": person.world[:said].astype(np.float32),
         "detector": np.array("synthetic")})
     times = None if photos else person.times.tolist()
     Clip(None if photos else 10.0, times, 720, 1280, None, "0", repeated=list(repeated)).write(folder / "clip.json")

@@ -207,3 +207,10 @@ def test_frames_that_repeat_others_carry_no_points_and_their_hands_are_not_calle
     trunk = [5, 6, 11, 12]
     assert not out["score"][20:50, trunk].any() and (out["score"][50:, trunk] > 0.2).all()
     assert warnings == []
+
+
+def test_frames_that_the_keypoints_lack_are_named_and_carry_no_points(synthetic, tmp_path):
+    person = synthetic.turning()
+    out, warnings = synthetic.through_stage(person, tmp_path, said=-20)
+    assert len(out["xy"]) == len(person.xy) and not out["score"][-20:, [5, 6, 11, 12]].any()
+    assert f"keypoints.npz lacks 20 of {len(person.xy)} frames" in warnings[0]

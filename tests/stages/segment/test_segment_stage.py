@@ -91,8 +91,15 @@ def test_one_empty_mask_costs_its_frame_and_not_the_run(folder, monkeypatch):
 
 def test_keypoints_of_another_clip_are_refused(folder):
     path, xy, score = folder
-    with pytest.raises(StageError, match="3 frames and keypoints of 2"):
-        segment(path, xy[:2], score[:2])
+    with pytest.raises(StageError, match="holds 4 frames, and the clip has 3"):
+        segment(path, xy[[0, 1, 2, 2]], score[[0, 1, 2, 2]])
+
+
+def test_a_frame_that_the_keypoints_lack_gets_an_empty_alpha(folder):
+    path, xy, score = folder
+    alphas, warnings = segment(path, xy[:2], score[:2])
+    assert not alphas[2].any() and alphas[0].any() and alphas[1].any()
+    assert "No person is in frame 2;" in warnings[0]
 
 
 def test_a_plate_that_does_not_fit_is_named_and_left_out(folder):

@@ -39,6 +39,11 @@ def test_frames_to_train_on_are_held_as_crops_of_the_person_that_know_their_whol
     assert all(views[t].pixels.nbytes == 4 for t in empty), "nobody needs no memory"
 
 
+def test_a_frame_without_a_mask_shows_nobody(folders):
+    (folders[1] / "000001.exr").unlink()
+    assert read_views(*folders, CAMERA, 80)[1] == [1, 2, 3]
+
+
 def test_a_crop_of_a_crop_is_the_same_crop(folders):
     view = read_views(*folders, CAMERA, 160)[0][1]
     again = person_crop(view)
