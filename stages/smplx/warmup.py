@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, write_alpha, write_arrays
+from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.contract import Job
@@ -43,7 +43,7 @@ def write_inputs(body: Body, folder: Path) -> dict[str, Path]:
     camera, vertices = params.camera(WIDTH, HEIGHT), body.posed(params)[0]
     points = body.keypoints(vertices)
     score = np.isfinite(points).all(-1).astype(np.float32)
-    inputs = {port: folder / Path(port).name for port in ("split/clip.json", "handgap/keypoints.npz", "face/face.npz",
+    inputs = {port: folder / Path(port).name for port in ("split/clip.json", "split/frames", "handgap/keypoints.npz", "face/face.npz",
                                                           "segment/alpha")}
     Clip(FPS, [t / FPS for t in range(FRAMES)], WIDTH, HEIGHT, None, "").write(inputs["split/clip.json"])
     write_arrays(inputs["handgap/keypoints.npz"], xy=np.nan_to_num(camera.project(points)).astype(np.float32), score=score,
@@ -53,7 +53,9 @@ def write_inputs(body: Body, folder: Path) -> dict[str, Path]:
     write_arrays(inputs["face/face.npz"], valid=np.ones(FRAMES, bool), jaw=np.zeros((FRAMES, 3), np.float32),
                  expression=np.zeros((FRAMES, body.exprdirs.shape[2]), np.float32), shape=np.zeros(1404, np.float32),
                  landmarks=np.full((FRAMES, 468, 3), np.nan, np.float32))
-    inputs["segment/alpha"].mkdir()
+    for port in ("split/frames", "segment/alpha"):
+        inputs[port].mkdir()
     for t in range(FRAMES):
+        write_frame(inputs["split/frames"] / f"{t:06d}.png", np.zeros((HEIGHT, WIDTH, 3), np.uint8))
         write_alpha(inputs["segment/alpha"] / f"{t:06d}.exr", silhouette(vertices[t], body.faces, camera).astype(np.float32))
     return inputs
