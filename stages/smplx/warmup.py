@@ -43,8 +43,8 @@ def write_inputs(body: Body, folder: Path) -> dict[str, Path]:
     camera, vertices = params.camera(WIDTH, HEIGHT), body.posed(params)[0]
     points = body.keypoints(vertices)
     score = np.isfinite(points).all(-1).astype(np.float32)
-    inputs = {port: folder / Path(port).name for port in ("split/clip.json", "split/frames", "handgap/keypoints.npz", "face/face.npz",
-                                                          "segment/alpha")}
+    inputs = {port: folder / Path(port).name for port in ("split/clip.json", "split/frames", "handgap/keypoints.npz",
+                                                          "face/face.npz", "segment/alpha")}
     Clip(FPS, [t / FPS for t in range(FRAMES)], WIDTH, HEIGHT, None, "").write(inputs["split/clip.json"])
     write_arrays(inputs["handgap/keypoints.npz"], xy=np.nan_to_num(camera.project(points)).astype(np.float32), score=score,
                  world=(points - points[:, HIPS].mean(1, keepdims=True)).astype(np.float32), detector=np.array("mediapipe"),
