@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import replace
 from functools import partial
 
+from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.fast import lod, prealign, size_search
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.cpu import Cpu
@@ -20,16 +23,29 @@ from gsac.stages.train.task import Fit, Task
 
 
 def fit_fast(backend: Backend, task: Task) -> Fit:
-    """Aligns the poses, fits the given number of gaussians or searches for it, adds coarser levels; removes drift, holds joints."""
+    """Aligns the poses, fits the given number of gaussians or searches for it; removes drift, holds joints; adds coarser levels.
+
+    On a GPU these are fitted beside what else is done, and go on behind the caller.
+    """
     if task.resumed is None:
         prealign.adjust(task, backend)
     fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, budget(task, backend.device))
     require_finite("after the last step", named_values(fit.gaussians))
-    levels = [fit.gaussians, *lod.fit_levels(task, backend, fit)]
-    levels = bone_drift.remove_drift(levels, task.poses, task.trained)
-    levels = hold_at_joints(levels, task.poses, task.trained)
-    fit.gaussians, *fit.coarser = shrink_strays(levels, task.poses, task.trained)
-    return fit
+    aside = ThreadPoolExecutor(1)
+    fitting = aside.submit(lod.fit_levels, replace(task, poses=task.poses.copy()), backend, fit)
+    if backend.device == "cpu" or task.network:  # torch records its graph alone
+        wait([fitting])
+    drift = bone_drift.remove_drift(task.poses, task.trained)
+    coarser = aside.submit(lambda: finish(fitting.result(), drift, task))
+    if backend.device == "cpu":
+        wait([coarser])
+    aside.shutdown(wait=False)
+    return replace(fit, gaussians=finish([fit.gaussians], drift, task)[0], coarser=coarser)
+
+
+def finish(levels: list[Gaussians], drift: bone_drift.Drift, task: Task) -> list[Gaussians]:
+    """The gaussians of each level as they are handed out, on bones turned back, and on the body where joints bend."""
+    return shrink_strays(hold_at_joints([drift.undo(level) for level in levels], task.poses, task.trained), task.poses, task.trained)
 
 
 BACKENDS: dict[str, Backend] = {"cpu": Cpu(), "cuda": Cuda()}
