@@ -62,7 +62,7 @@ class Fit:
     smaller: list[Fit] = field(default_factory=list)
     """Smaller sizes that were tried and not taken, the largest of them first."""
     coarser: Future[list[Gaussians]] = field(default_factory=lambda: settled([]))
-    """Coarser levels of detail, the finest of them first, which may still be at work, and at the task's views, behind the caller."""
+    """Coarser levels of detail, the finest of them first. They may still be in the making, from the task's views."""
 
 
 def settled(levels: list[Gaussians]) -> Future[list[Gaussians]]:
