@@ -32,14 +32,18 @@ struct Pixel {
     float alpha, mask;
 };
 
-// Render, in the frame's exposure, and target over the batch's background; a tile without gaussians was not rendered.
+// Premultiplied colour and alpha of a pixel; a tile without gaussians was not rendered.
+FORMULA float4 render_at(const Scene &s, const Place &p, int x, int y) {
+    if (!s.tile_count[p.b * s.max_tiles + y / TILE * p.columns + x / TILE]) return {0, 0, 0, 0};
+    return ((const float4 *)s.image)[size_t(p.b) * s.max_pixels + y * p.width + x];
+}
+
+// Render, in the frame's exposure, and target over the batch's background.
 FORMULA Pixel pixel_of(const Scene &s, const Place &p, int x, int y) {
     const Now &now = s.now[p.b];
     const float byte = 1 / 255.0f;
     uchar4 true_pixel = ((const uchar4 *)s.pixels)[now.frame.pixels + size_t(y) * p.width + x];
-    float4 render = {0, 0, 0, 0};
-    if (s.tile_count[p.b * s.max_tiles + y / TILE * p.columns + x / TILE])
-        render = ((const float4 *)s.image)[size_t(p.b) * s.max_pixels + y * p.width + x];
+    float4 render = render_at(s, p, x, y);
     Pixel out;
     out.alpha = render.w;
     out.mask = true_pixel.w * byte;
@@ -81,6 +85,9 @@ FORMULA void load_row(const float *from, float *to) {
 FORMULA float seen_of(const Scene &s, const Pixel &pixel) { return s.masked ? pixel.alpha * pixel.mask : 1; }
 
 FORMULA float3 operator*(float3 a, float f) { return {a.x * f, a.y * f, a.z * f}; }
+FORMULA float4 operator*(float4 a, float f) { return {a.x * f, a.y * f, a.z * f, a.w * f}; }
+FORMULA float4 operator-(float4 a, float4 b) { return {a.x - b.x, a.y - b.y, a.z - b.z, a.w - b.w}; }
+FORMULA float dot(float4 a, float4 b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
 
 // Grey render and target at a place of the square frame: outside of the box background, beyond the square zero.
 FORMULA float2 greys_at(const Scene &s, const Place &p, int x, int y) {

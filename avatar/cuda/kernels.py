@@ -11,10 +11,11 @@ from gsac.avatar.cuda.structs import declarations
 from gsac.avatar.draw_rule import cuda_constants
 
 SOURCES = ("formulas.cuh", "paper_formulas.cuh", "geometry.cuh", "blend.cuh", "image.cuh", "perceptual.cuh", "update.cuh",
-           "offsets.cuh", "shape.cuh", "paper.cuh")
+           "offsets.cuh", "shape.cuh", "paper.cuh", "equations.cuh")
 KERNELS = ("skin", "project", "allocate", "fill", "blend", "compare", "cut_window", "image_gradient", "blend_backward",
            "gaussian_step", "gather", "joint_step", "offset_step", "shape_gradient", "shape_step", "expression_step",
-           "place_joints", "dice", "pose_gaussians", "nearest", "neighbourhood", "paper_step")
+           "place_joints", "dice", "pose_gaussians", "nearest", "neighbourhood", "paper_step",
+           "residuals", "pose_hessian", "keep_equations")
 OPTIONS = ("--std=c++17", "--extra-device-vectorization")
 
 

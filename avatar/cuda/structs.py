@@ -51,6 +51,8 @@ POINTERS = {
     "pulled": "float", "hits": "int", "centres": "int",
     "window": "float", "window_slope": "float", "window_value": "float",
     "grad_out": "float", "pose_grad_out": "double",
+    "turn_share": "float", "tile_shown": "float", "hessian_part": "float", "hessian": "float", "pose_gradient": "double",
+    "shown": "float",
 }
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
@@ -60,10 +62,10 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
            "area": FLOAT, "half_side": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT,
            "masked": INT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
            "perceptual": FLOAT, "expression_count": INT, "expression_unit": FLOAT, "joint_unit": FLOAT,
-           "fresh": DOUBLE, "tiny": DOUBLE}
+           "hessian_parts": INT, "fresh": DOUBLE, "tiny": DOUBLE}
 """area: pixels that a frame's losses are a mean over, 0: its own; it and the next six are recipe `paper`'s (paper.cuh); the next
-five are LPIPS' (perceptual.cuh), the next three belong to expressions and joints at rest (shape.cuh), the last two to Adam of the
-body."""
+five are LPIPS' (perceptual.cuh), the next three belong to expressions and joints at rest (shape.cuh), the next one to the
+poses' normal equations (equations.cuh), the last two to Adam of the body."""
 
 
 class Frame(ctypes.Structure):

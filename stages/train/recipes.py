@@ -3,33 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import replace
 from functools import partial
 
 from gsac.stages.train.fast import lod, prealign, size_search
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.cuda import Cuda
+from gsac.stages.train.fast.finish import Finish
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.finite import named_values, require_finite
-from gsac.stages.train.gaussians.joint_faces import hold_at_joints
-from gsac.stages.train.gaussians.joint_strays import shrink_strays
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
-from gsac.stages.train.poses import bone_drift
 from gsac.stages.train.task import Fit, Task
 
 
 def fit_fast(backend: Backend, task: Task) -> Fit:
-    """Aligns the poses, fits the given number of gaussians or searches for it, adds coarser levels; removes drift, holds joints."""
+    """Aligns the poses, fits the given number of gaussians or searches for it; adds coarser levels; finishes them all.
+
+    On a GPU the levels are fitted beside what else is done, and go on behind the caller.
+    """
     if task.resumed is None:
         prealign.adjust(task, backend)
     fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, budget(task, backend.device))
     require_finite("after the last step", named_values(fit.gaussians))
-    levels = [fit.gaussians, *lod.fit_levels(task, backend, fit)]
-    levels = bone_drift.remove_drift(levels, task.poses, task.trained)
-    levels = hold_at_joints(levels, task.poses, task.trained)
-    fit.gaussians, *fit.coarser = shrink_strays(levels, task.poses, task.trained)
-    return fit
+    with_drift = replace(task, poses=task.poses.copy())
+    aside = ThreadPoolExecutor(2)
+    finish = aside.submit(Finish, task.poses, task.trained)
+    coarser = aside.submit(lod.fit_levels, with_drift, backend, fit, lambda level: finish.result()(level))
+    aside.shutdown(wait=False)
+    if backend.device == "cpu" or task.network:  # torch records its graph alone
+        wait([coarser])
+    return replace(fit, gaussians=finish.result()(fit.gaussians), coarser=coarser)
 
 
 BACKENDS: dict[str, Backend] = {"cpu": Cpu(), "cuda": Cuda()}

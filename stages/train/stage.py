@@ -213,10 +213,19 @@ class Run:
         self.seconds, self.cpu_seconds = self.clock()
         require_finite("after the last step", named_result(self.result.gaussians, self.poses))
         self.seen_area = seen_area(self.poses, self.trained, self.views)
-        self.views.clear()  # judging takes as much memory again
+        self.result.coarser.add_done_callback(self.free_views)
+
+    def free_views(self, _: Future[list[Gaussians]]) -> None:
+        """Gives back the memory of the views, which no level needs any more: judging takes as much again."""
+        self.views.clear()
         hand_back()
-        for level in self.result.coarser:
+
+    def coarser(self) -> list[Gaussians]:
+        """The coarser levels, once they are fitted."""
+        levels = self.result.coarser.result()
+        for level in levels:
             require_finite("after the last step", named_values(level))
+        return levels
 
     def clock(self) -> np.ndarray:
         """(2,) s, wall and CPU time of training, including that before a stop, without judging."""
@@ -297,10 +306,12 @@ class Run:
         folder.mkdir()
         job.progress(0, *JUDGING)
         poses = self.poses_of_all()
-        gaussians.write(job.out / "avatar.npz", self.result.coarser)
         poses.to_params().write(job.out / "body.npz")
         write_frame(folder / "views.png", draw_all_round(gaussians, poses))
-        figures = json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n"
+        with ThreadPoolExecutor(1) as aside:
+            writing = aside.submit(lambda: gaussians.write(job.out / "avatar.npz", self.coarser()))
+            figures = json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n"
+            writing.result()
         write_file(job.out / "metrics.json", figures.encode())
         self.tell_timings()
 
@@ -320,9 +331,9 @@ class Run:
         with ThreadPoolExecutor(1) as aside:  # a GPU is this thread's alone
             judging = aside.submit(self.judge_both, gaussians, poses, small, folder)
             comparing = aside.submit(self.judge_fit_and_trained, gaussians, poses)
-            looking = aside.submit(judge_levels, gaussians, self.result.coarser, poses,
-                                   {t: view.reduced(trained.height) for t, view in self.filmed.items()})
             bending = aside.submit(judge_novel, gaussians, poses)
+            looking = aside.submit(lambda: judge_levels(gaussians, self.coarser(), poses,
+                                                        {t: view.reduced(trained.height) for t, view in self.filmed.items()}))
             if self.job.device == "cpu":
                 beside: list[Future[Any]] = [judging, comparing, looking, bending]
                 wait(beside)  # twice as many frames at once would take twice the memory

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -60,5 +61,12 @@ class Fit:
     """The recipe's own entries of metrics.json."""
     smaller: list[Fit] = field(default_factory=list)
     """Smaller sizes that were tried and not taken, the largest of them first."""
-    coarser: list[Gaussians] = field(default_factory=list)
-    """Coarser levels of detail, the finest of them first."""
+    coarser: Future[list[Gaussians]] = field(default_factory=lambda: settled([]))
+    """Coarser levels of detail, the finest of them first. They may still be in the making, from the task's views."""
+
+
+def settled(levels: list[Gaussians]) -> Future[list[Gaussians]]:
+    """Levels that are there already."""
+    future: Future[list[Gaussians]] = Future()
+    future.set_result(levels)
+    return future

@@ -11,6 +11,7 @@ import numpy as np
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.fast.refit import Pace
 from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.poses.bundle_adjust import Equations
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Fit, Task
 from gsac.stages.train.views import View, Views
@@ -71,6 +72,10 @@ class Backend(ABC):
     def open_rounds(self, task: Task, views: dict[int, View], gaussians: Gaussians,
                     plan: list[Round]) -> AbstractContextManager[Rounds]:
         """A context in which the gaussians learn by the plan while someone else moves task.poses. views: trained frame -> view."""
+
+    @abstractmethod
+    def open_equations(self, task: Task, gaussians: Gaussians, views: dict[int, View]) -> AbstractContextManager[Equations]:
+        """A context that has the normal equations of task.poses in the views, frame -> view, for these gaussians as they learn."""
 
     @abstractmethod
     def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:

@@ -18,7 +18,7 @@ from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
 from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, person_pixels
 from gsac.stages.train.fast.trainer import AT_ONCE, Step, Trainer
 from gsac.stages.train.judge.heldout import align_pose
-from gsac.stages.train.poses.bundle_adjust import correct_midway
+from gsac.stages.train.poses.bundle_adjust import Equations, FrameEquations, correct_midway
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, Views, of_each
@@ -50,7 +50,8 @@ class Cpu(Backend):
         midway = round(MIDWAY * steps) // AT_ONCE * AT_ONCE if config.pose_rounds else -1
         for step in range(first, steps, AT_ONCE):
             if step == midway:
-                correct_midway(task.poses, task.trained, trainer.gaussians, trainer.face, coarse if step < coarse_until else fine)
+                opened = self.open_equations(task, trainer.gaussians(), coarse if step < coarse_until else fine)
+                correct_midway(task.poses, task.trained, trainer.gaussians, opened)
             if trainer.offsets and step / steps >= OFFSET_SHARE:
                 trainer.fold_offsets()
                 trainer.lay_unseen(coarse)
@@ -100,6 +101,11 @@ class Cpu(Backend):
     def open_rounds(self, task: Task, views: dict[int, View], gaussians: Gaussians, plan: list[Round]) -> Iterator[Rounds]:
         """As `Backend.open_rounds`."""
         yield CpuRounds(task, views, gaussians, plan)
+
+    @contextmanager
+    def open_equations(self, task: Task, gaussians: Gaussians, views: dict[int, View]) -> Iterator[Equations]:
+        """As `Backend.open_equations`."""
+        yield FrameEquations(task.poses, gaussians.face, views)
 
     def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""

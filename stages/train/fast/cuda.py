@@ -12,12 +12,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from gsac.avatar import rotation
 from gsac.avatar.cuda import rounds as cuda_rounds
 from gsac.avatar.cuda.align import Aligner, AlignRecipe
+from gsac.avatar.cuda.equations import EquationsRecipe, PoseEquations
 from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.rounds import RoundsRecipe, RoundsTrainer
 from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY
 from gsac.stages.train.config import FAST_STEPS, TrainConfig, coarse_share, coarse_steps
 from gsac.stages.train.fast import schedule
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
@@ -29,6 +32,8 @@ from gsac.stages.train.gaussians import cloth_offsets
 from gsac.stages.train.gpu import LPIPS_STEPS, hand_back, open_trainer, train_until
 from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.poses import bundle_adjust
+from gsac.stages.train.poses.bundle_adjust import Equations
+from gsac.stages.train.poses.photometric import CURVATURE, NormalEquations, joint_shares
 from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, TURN, Poses
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
 from gsac.stages.train.views import View, Views, of_each, person_crop
@@ -39,7 +44,7 @@ SomeRecipe = TypeVar("SomeRecipe", bound=Recipe)
 
 
 class Cuda(Backend):
-    """The steps of a training as one graph of kernels; equations of the poses are solved on the CPU."""
+    """The steps of a training as one graph of kernels; equations of the poses are worked out there, and solved on the CPU."""
 
     device = "cuda"
 
@@ -53,7 +58,7 @@ class Cuda(Backend):
                              least=schedule.shortest_axis(task), **lpips_options(task))
         with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer:
             if task.config.pose_rounds:
-                correct_midway(trainer, task, coarse)
+                self.correct_midway(trainer, task, coarse)
             train_until(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
             body = trainer.body
             folded = cloth_offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
@@ -97,6 +102,24 @@ class Cuda(Backend):
             yield CudaRounds(trainer, task, gaussians)
             task.gpu_seconds += trainer.seconds
 
+    @contextmanager
+    def open_equations(self, task: Task, gaussians: Gaussians, views: dict[int, View]) -> Iterator[Equations]:
+        """As `Backend.open_equations`; their time on the GPU is added to task.gpu_seconds."""
+        frames = np.array(list(views))
+        recipe = EquationsRecipe(steps=len(frames), turn_share=joint_shares(task.poses.body, gaussians.face))
+        with open_trainer(PoseEquations, task.poses, frames, [views], gaussians, recipe) as trainer:
+            yield CudaEquations(trainer, task.poses, frames)
+            task.gpu_seconds += trainer.seconds
+
+    def correct_midway(self, trainer: CudaTrainer, task: Task, views: dict[int, View]) -> None:
+        """Trains up to where `Cpu.train` corrects all poses together, and corrects them by views of half the size, as there."""
+        if midway := round(schedule.MIDWAY * trainer.recipe.steps):
+            train_until(trainer, task, midway)
+            poses, trained = task.poses, task.trained
+            opened = self.open_equations(task, trainer.gaussians(), views)
+            if bundle_adjust.correct_midway(poses, trained, trainer.gaussians, opened):
+                trainer.place(poses.pose[trained], poses.transl[trained])
+
     def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""
         if not len(frames):
@@ -124,13 +147,20 @@ class CudaRounds(Rounds):
         return self._trainer.gaussians()
 
 
-def correct_midway(trainer: CudaTrainer, task: Task, views: dict[int, View]) -> None:
-    """Trains up to where `Cpu.train` corrects all poses together, and corrects them by views of half the size, as there."""
-    if midway := round(schedule.MIDWAY * trainer.recipe.steps):
-        train_until(trainer, task, midway)
-        poses, trained = task.poses, task.trained
-        if bundle_adjust.correct_midway(poses, trained, trainer.gaussians, trainer.face, views):
-            trainer.place(poses.pose[trained], poses.transl[trained])
+class CudaEquations:
+    """`bundle_adjust.Equations` of the frames that a PoseEquations holds, (n,) indices."""
+
+    def __init__(self, trainer: PoseEquations, poses: Poses, frames: np.ndarray):
+        self._trainer, self._poses, self._frames, self._worn = trainer, poses, frames, poses.offset.copy()
+
+    def __call__(self, gaussians: Gaussians) -> list[tuple[int, NormalEquations]]:
+        poses, frames = self._poses, self._frames
+        found = self._trainer.measure(gaussians, poses.pose[frames], poses.transl[frames], poses.offset - self._worn)
+        turns = np.einsum("tjba,tjb->tja", rotation.log_derivative(poses.pose[frames][:, BODY]), found.gradient[:, BODY])
+        gradients = np.concatenate([turns.reshape(len(frames), -1), found.gradient[:, -1]], 1)
+        hessians = CURVATURE * found.hessian.astype(np.float64)
+        return [(int(t), NormalEquations(gradient, hessian, float(error), int(pixels))) for t, gradient, hessian, error, pixels
+                in zip(frames, gradients, hessians, found.error, found.pixels, strict=True)]
 
 
 def make_recipe(config: TrainConfig, count: int, kind: type[SomeRecipe] = Recipe, **more: Any) -> SomeRecipe:

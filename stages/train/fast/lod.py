@@ -5,8 +5,9 @@ From afar many gaussians share a pixel, and then fewer that were fitted to small
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -46,18 +47,21 @@ FRAMES = 6
 """Frames that are looked at, at most, to find up to which height a level is drawn."""
 
 
-def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
-    """Levels below fit.gaussians, the finest of them first; none of `LEVELS` that has as many gaussians as the one before it."""
+def fit_levels(task: Task, backend: Backend, fit: Fit, finish: Callable[[Gaussians], Gaussians]) -> list[Gaussians]:
+    """Levels below fit.gaussians, the finest of them first; none of `LEVELS` that has as many gaussians as the one before it.
+
+    finish: a level as it is handed out, from the gaussians as they were fitted.
+    """
     rest, body = task.poses.rest(int(task.trained[0]))[0], task.poses.body
     filmed = crop_views(task)
     tall = typical_height(task.poses, filmed)
     poses, looked_at = find_frames(task, filmed)
     coarse = scale_views(looked_at, MOVED / tall)
-    out: list[Gaussians] = []
+    finished: list[Future[Gaussians]] = []
     heights: list[Future[float]] = []
     finer, finer_seen, placed = fit.gaussians, fit.seen, None
     smaller = [(tried.gaussians, tried.seen) for tried in fit.smaller]
-    with ThreadPoolExecutor(1) as aside:  # a level is looked at while the next one is fitted
+    with ThreadPoolExecutor(1) as aside:  # a level is looked at and finished while the next one is fitted
         for level in LEVELS:
             if len(finer) <= level.most:
                 continue
@@ -73,12 +77,10 @@ def fit_levels(task: Task, backend: Backend, fit: Fit) -> list[Gaussians]:
             gaussians, seen = backend.refit(task, trainer, views, pace).finish(views)
             finer_placed, placed = placed, aside.submit(move, gaussians, task, poses, coarse)
             heights.append(aside.submit(look, gaussians, placed, finer, finer_placed, scale_views(looked_at, scale)))
-            out.append(gaussians)
+            finished.append(aside.submit(finish, gaussians))
             finer, finer_seen = gaussians, seen
     least = np.minimum.accumulate([height.result() for height in heights])
-    for gaussians, height in zip(out, least, strict=True):
-        gaussians.max_height_px = float(height)
-    return out
+    return [replace(level.result(), max_height_px=float(height)) for level, height in zip(finished, least, strict=True)]
 
 
 def look(level: Gaussians, poses: Future[Poses], finer: Gaussians, finer_poses: Future[Poses], views: dict[int, View]) -> float:

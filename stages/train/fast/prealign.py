@@ -36,8 +36,9 @@ def adjust(task: Task, backend: Backend) -> None:
     views = shrink_views(task)
     count = min(COUNT, budget(task, backend.device))
     plan = draw_rounds(list(views), rounds, np.random.default_rng([config.seed, 1]))
-    with backend.open_rounds(task, views, init_gaussians(task, views, count), plan) as learned:
-        corrections = Corrections(task.poses, learned.gaussians, learned.face, views)
+    gaussians = init_gaussians(task, views, count)
+    with backend.open_rounds(task, views, gaussians, plan) as learned, backend.open_equations(task, gaussians, views) as equations:
+        corrections = Corrections(task.poses, learned.gaussians, equations)
         for number in range(rounds):
             learned.learn(number)
             corrections.solve()

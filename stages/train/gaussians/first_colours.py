@@ -13,6 +13,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.light import FROM_CAMERA, basis, shade
+from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
 from gsac.stages.train.gaussians.nearest import find_nearest
@@ -78,7 +79,8 @@ def mean_colours(sights: list[Sight], count: int, light: np.ndarray | None = Non
 
     Returns rgb (N, 3) float32 in 0..1, grey where unseen, and seen (N,) bool.
     """
-    return _mean_colours(_concatenate(sights), count, light)
+    sight = _concatenate(sights)
+    return _mean_colours(sight, count, np.ones_like(sight.colour) if light is None else shade(light, sight.normal))
 
 
 def _concatenate(sights: list[Sight]) -> Sight:
@@ -87,15 +89,37 @@ def _concatenate(sights: list[Sight]) -> Sight:
     return Sight(*map(np.concatenate, parts)) if sights else Sight(np.zeros(0, np.int64), *np.zeros((2, 0, 3)), np.zeros(0))
 
 
-def _mean_colours(sight: Sight, count: int, light: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    factor = np.ones_like(sight.colour) if light is None else shade(light, sight.normal)
-    weighted, square = sight.weight[:, None] * sight.colour * factor, sight.weight[:, None] * factor**2
-    total, weight = (np.stack([np.bincount(sight.which, channel, count) for channel in values.T], 1)
-                     for values in (weighted, square))
+def _mean_colours(sight: Sight, count: int, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As `mean_colours`. factor: (M, 3) of the light."""
+    total, weight = np.zeros((2, count, 3))
+    _sum_colours(sight.which, sight.colour, sight.weight, factor, total, weight)
     seen = weight[:, 0] > 0
     rgb = np.full((count, 3), 0.5, np.float32)
     rgb[seen] = np.clip(total[seen] / weight[seen], 0, 1)
     return rgb, seen
+
+
+@own_kernel(nogil=True, error_model="numpy")
+def _sum_colours(which, colour, weight, factor, total, square):
+    """Adds to the rows which (M,) of total and square, (N, 3) both: colours (M, 3) and 1, by weight (M,) and factor (M, 3)."""
+    for i in range(len(which)):
+        for c in range(3):
+            total[which[i], c] += weight[i] * colour[i, c] * factor[i, c]
+            square[which[i], c] += weight[i] * (factor[i, c] * factor[i, c])
+
+
+@own_kernel(nogil=True, error_model="numpy")
+def _weigh_light(which, colour, weight, rgb, square, product):
+    """Writes square and product, (M,) both: weight (M,) times the means of rgb rgb and of rgb colour, rgb (N, 3) and colour (M, 3)
+    of a gaussian, which (M,).
+    """
+    for i in range(len(which)):
+        own, seen = 0.0, 0.0
+        for c in range(3):
+            value = np.float64(rgb[which[i], c])
+            own += value * value
+            seen += value * colour[i, c]
+        square[i], product[i] = weight[i] * (own / 3), weight[i] * (seen / 3)
 
 
 def find_light(sights: list[Sight], count: int) -> np.ndarray:
@@ -111,12 +135,12 @@ def find_light(sights: list[Sight], count: int) -> np.ndarray:
     if not seen:
         return light.astype(np.float32)
     trust, terms = TOLD * len(sights) / NOISE**2 / seen, basis(every.normal).astype(np.float64)
+    square, product = np.empty((2, len(every.which)))
     for _ in range(ROUNDS):
-        rgb = _mean_colours(every, count, light)[0].astype(np.float64)[every.which]
-        square = terms.T @ (terms * (every.weight * (rgb**2).mean(1))[:, None])
-        product = terms.T @ (every.weight * (rgb * every.colour).mean(1))
+        rgb, _ = _mean_colours(every, count, shade(light, every.normal))
+        _weigh_light(every.which, every.colour, every.weight, rgb, square, product)
         prior = np.diag([0, 1, 1, 1]) / EVEN**2
-        white = np.linalg.solve(trust * square + prior, trust * product)
+        white = np.linalg.solve(trust * (terms.T @ (terms * square[:, None])) + prior, trust * (terms.T @ product))
         mean = float(every.weight @ (terms @ white))
         light = np.tile((white * seen / mean)[:, None], 3)
     return light.astype(np.float32)

@@ -63,11 +63,18 @@ class Posed(NamedTuple):
     frames: FaceFrames
 
 
-def hold_at_joints(levels: list[Gaussians], poses: Poses, frames: np.ndarray) -> list[Gaussians]:
-    """The gaussians of each level, some bound to other faces.
+class Bending(NamedTuple):
+    """The body in the clip's usual pose and with joints bent."""
 
-    frames: (n,) trained ones, whose median pose leaves each gaussian where it is.
-    """
+    body: Body
+    rest: np.ndarray
+    """(V, 3) m."""
+    usual: Posed
+    bent: list[Posed]
+
+
+def bend(poses: Poses, frames: np.ndarray) -> Bending:
+    """The body as `BENDS` have it. frames: (n,) trained ones, whose median pose is the usual one."""
     body, (rest, joints) = poses.body, poses.rest(int(frames[0]))
     usual = np.median(poses.pose[frames], 0)
     usual[0] = 0
@@ -77,14 +84,12 @@ def hold_at_joints(levels: list[Gaussians], poses: Poses, frames: np.ndarray) ->
                      face_frames(body.bend(rest, joints, pose), body.faces))
 
     posed, *bent = side_by_side(carry, [usual, *(turn_joints(usual, turns) for turns in BENDS)])
-    return [choose_faces(gaussians, posed, bent, rest, body) for gaussians in levels]
+    return Bending(body, rest, posed, bent)
 
 
-def choose_faces(gaussians: Gaussians, usual: Posed, bent: list[Posed], rest: np.ndarray, body: Body) -> Gaussians:
-    """The gaussians where they are in the usual pose, some bound to the face that carries them best to the bent ones.
-
-    rest: (V, 3) m.
-    """
+def hold_at_joints(gaussians: Gaussians, bending: Bending) -> Gaussians:
+    """The gaussians where they are in the usual pose, some bound to the face that carries them best to the bent ones."""
+    body, rest, usual, bent = bending
     share, at = Workspace().share, usual.frames
     bound = bind(at, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     skinned = face_weights(body)

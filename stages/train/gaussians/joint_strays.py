@@ -63,30 +63,42 @@ class Bent(NamedTuple):
     sides: list[Side]
 
 
-def shrink_strays(levels: list[Gaussians], poses: Poses, frames: np.ndarray) -> list[Gaussians]:
-    """The gaussians of each level, some smaller. frames: (n,) trained ones, whose median pose is the usual one."""
+class Bending(NamedTuple):
+    """The body in the clip's usual pose and with joints bent."""
+
+    faces: np.ndarray
+    """(F, 3)."""
+    usual: Placed
+    bent: list[Bent]
+
+
+def bend(poses: Poses, frames: np.ndarray) -> Bending:
+    """The body as `BENDS` have it. frames: (n,) trained ones, whose median pose is the usual one."""
     pose, faces = np.median(poses.pose[frames], 0), poses.body.faces
     pose[0] = 0
-    usual = place(put_in_pose(poses, int(frames[0]), pose), faces)
     bent = side_by_side(lambda turns, _: see(put_in_pose(poses, int(frames[0]), turn_joints(pose, turns)), faces), BENDS)
-    out = [level[np.arange(len(level))] for level in levels]
+    return Bending(faces, place(put_in_pose(poses, int(frames[0]), pose), faces), bent)
 
-    def find_large(item: tuple[Gaussians, Bent, np.ndarray], _: Workspace) -> np.ndarray:
-        gaussians, posed, stray = item
+
+def shrink_strays(gaussians: Gaussians, bending: Bending) -> Gaussians:
+    """The gaussians, some smaller."""
+    faces, usual, left = bending
+    out = gaussians[np.arange(len(gaussians))]
+
+    def find_large(item: tuple[Bent, np.ndarray], _: Workspace) -> np.ndarray:
+        posed, stray = item
         large = np.flatnonzero(stray > LEAST)
-        return large[find_reach(gaussians[large], posed.surface) > find_reach(gaussians[large], usual) + GROWN]
+        return large[find_reach(out[large], posed.surface) > find_reach(out[large], usual) + GROWN]
 
-    left = [(gaussians, posed) for gaussians in out for posed in bent]
     for _ in range(ROUNDS):
-        shown = side_by_side(lambda seen, workspace: find_stray(*seen, faces, workspace),
-                             [(gaussians, side) for gaussians, posed in left for side in posed.sides])
-        sums = [sum(shown[TURNS * k:TURNS * (k + 1)], np.zeros(len(gaussians))) for k, (gaussians, _) in enumerate(left)]
-        found = side_by_side(find_large, [(*item, stray) for item, stray in zip(left, sums, strict=True)])
-        for gaussians in out:
-            strays = [large for (own, _), large in zip(left, found, strict=True) if own is gaussians]
-            if strays:
-                gaussians.log_scale[np.unique(np.concatenate(strays))] += np.float32(np.log(SHRUNK))
-        left = [item for item, large in zip(left, found, strict=True) if len(large)]
+        shown = side_by_side(lambda side, workspace: find_stray(out, side, faces, workspace),
+                             [side for posed in left for side in posed.sides])
+        sums = [sum(shown[TURNS * k:TURNS * (k + 1)], np.zeros(len(out))) for k in range(len(left))]
+        found = side_by_side(find_large, zip(left, sums, strict=True))
+        left = [posed for posed, large in zip(left, found, strict=True) if len(large)]
+        if not left:
+            break
+        out.log_scale[np.unique(np.concatenate(found))] += np.float32(np.log(SHRUNK))
     return out
 
 

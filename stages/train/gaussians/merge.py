@@ -70,25 +70,32 @@ def find_cheapest_pairs(gaussians: Gaussians, bound: Bound, shown: np.ndarray, n
     near = find_nearest(places, places, NEIGHBOURS + 1)[:, 1:]
     one, other = np.repeat(np.arange(len(places)), near.shape[1]), near.ravel()
     i, j = distinct_pairs(np.minimum(one, other), np.maximum(one, other), len(places))
-    fit = (normals[i] * normals[j]).sum(1) > SAME_SIDE
-    _leave_same_part(i, j, skin_weights(gaussians.face, body), fit)
-    i, j = i[fit], j[fit]
-    colour = ((gaussians.rgb[i].astype(np.float64) - gaussians.rgb[j]) ** 2).sum(1)
-    apart = ((places[i] - places[j]) ** 2).sum(1) / max(areas(bound).mean(), 1e-12)
-    cost = shown[i] * shown[j] / (shown[i] + shown[j]) * (colour + EVEN**2 * apart)
+    cost, size = np.empty(len(i)), max(areas(bound).mean(), 1e-12)
+    _weigh_pairs(i, j, normals, skin_weights(gaussians.face, body), gaussians.rgb, places, shown, size, cost)
+    fit = ~np.isinf(cost)
+    i, j, cost = i[fit], j[fit], cost[fit]
     order = np.argsort(cost, kind="stable")
     return _take_free(i[order], j[order], np.ones(len(places), bool))
 
 
-@own_kernel(nogil=True)
-def _leave_same_part(i, j, skin, fit):
-    """fit (P,) bool: becomes False where the skin weights (N, J) of i (P,) and j (P,) are too far apart."""
+@own_kernel(nogil=True, error_model="numpy")
+def _weigh_pairs(i, j, normals, skin, rgb, places, shown, size, cost):
+    """cost (P,), written: of merging i (P,) with j (P,), infinite where they are not of one side and one part.
+
+    normals: (N, 3); skin: (N, J) weights; rgb: (N, 3); places: (N, 3) m; shown: (N,) pixels; size: of a mean gaussian, m2.
+    """
     for pair in range(len(i)):
-        if fit[pair]:
-            apart = 0.0
-            for joint in range(skin.shape[1]):
-                apart += abs(skin[i[pair], joint] - skin[j[pair], joint])
-            fit[pair] = 0.5 * apart < SAME_PART
+        one, other = i[pair], j[pair]
+        alike, colour, way, apart = np.float32(0), 0.0, 0.0, 0.0
+        for c in range(3):
+            alike += normals[one, c] * normals[other, c]
+            colour += (np.float64(rgb[one, c]) - rgb[other, c]) ** 2
+            way += (places[one, c] - places[other, c]) ** 2
+        for joint in range(skin.shape[1]):
+            apart += abs(skin[one, joint] - skin[other, joint])
+        cost[pair] = np.inf
+        if alike > SAME_SIDE and 0.5 * apart < SAME_PART:
+            cost[pair] = shown[one] * shown[other] / (shown[one] + shown[other]) * (colour + EVEN**2 * (way / size))
 
 
 @own_kernel(nogil=True)

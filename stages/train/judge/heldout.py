@@ -60,12 +60,6 @@ class Candidate(NamedTuple):
 def judge(gaussians: Gaussians, poses: Poses, frames: Iterable[int], views: Views, folder: Path | None = None,
           flip: bool = False, networks: Mapping[str, FeatureDistance] | None = None) -> list[dict]:
     """`metrics.score` of each frame; with a folder also %06d_truth, _render and _error PNGs on white."""
-    return judge_all([Candidate(gaussians, poses, frames, views)], folder, flip, networks)[0]
-
-
-def judge_all(candidates: list[Candidate], folder: Path | None = None, flip: bool = False,
-              networks: Mapping[str, FeatureDistance] | None = None) -> list[list[dict]]:
-    """`judge` of each candidate, all their frames side by side."""
 
     def row(candidate: Candidate, t: int, workspace: Workspace) -> dict:
         images, boxes = draw(candidate, t, workspace), find_boxes(candidate.poses, t, candidate.views[t].camera)
@@ -73,7 +67,12 @@ def judge_all(candidates: list[Candidate], folder: Path | None = None, flip: boo
             write_pictures(folder, t, *images)
         return score(*images, boxes, flip, networks)
 
-    return _of_each_frame(candidates, row)
+    return _of_each_frame([Candidate(gaussians, poses, frames, views)], row)[0]
+
+
+def judge_all(candidates: list[Candidate]) -> list[list[dict]]:
+    """`metrics.score` of each candidate's frames, without boxes, all side by side."""
+    return _of_each_frame(candidates, lambda candidate, t, workspace: score(*draw(candidate, t, workspace)))
 
 
 def judge_person(candidates: list[Candidate]) -> list[list[dict]]:

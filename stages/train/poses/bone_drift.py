@@ -7,11 +7,12 @@ their gaussians and joints, until the fit's angles show the person where the ref
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from gsac.avatar import rotation
-from gsac.avatar.binding import bind, face_frames, unbind
+from gsac.avatar.binding import FaceFrames, bind, face_frames, unbind
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
@@ -31,8 +32,21 @@ MOST = 0.08
 """rad, largest drift: a bone that is turned farther was fitted wrong."""
 
 
-def remove_drift(gaussians: list[Gaussians], poses: Poses, trained: np.ndarray) -> list[Gaussians]:
-    """The gaussians on bones turned back; changes the angles and joints in `poses` to match. trained: (n,) indices of frames."""
+class Drift(NamedTuple):
+    """A drift of bones that was removed from the poses: where the body's faces were at rest, and where they are since."""
+
+    turned: FaceFrames
+    plain: FaceFrames
+
+    def undo(self, gaussians: Gaussians) -> Gaussians:
+        """The gaussians of the poses as they were, on the bones turned back."""
+        g = gaussians
+        mu, quat, log_scale = unbind(self.plain, g.face, bind(self.turned, g.face, g.mu, g.quat, g.log_scale))
+        return replace(g, mu=mu, quat=quat, log_scale=log_scale)
+
+
+def remove_drift(poses: Poses, trained: np.ndarray) -> Drift:
+    """Turns the bones of `poses` back, in angles and joints. trained: (n,) indices of frames."""
     rest, joints = poses.rest(int(trained[0]))
     turns = find_drift(poses, trained, rest, joints)
     moved = joints.copy()
@@ -41,15 +55,10 @@ def remove_drift(gaussians: list[Gaussians], poses: Poses, trained: np.ndarray) 
         moved[joint] = moved[parent] + turns[parent] @ (joints[joint] - joints[parent])
     transforms = np.concatenate([turns, (moved - np.einsum("jab,jb->ja", turns, joints))[..., None]], 2).astype(np.float32)
     turned = face_frames(skin(rest, transforms, poses.body.skin_index, poses.body.skin_weight), poses.body.faces)
-    plain = face_frames(rest, poses.body.faces)
-    for pose in (poses.pose, poses.base_pose):
-        pose[:] = turn_back(pose, turns, poses.body.parents)
+    # new arrays: a copy of the poses may share the old ones
+    poses.pose, poses.base_pose = (turn_back(pose, turns, poses.body.parents) for pose in (poses.pose, poses.base_pose))
     poses.joint_offset = poses.joint_offset + moved - joints
-    out = []
-    for g in gaussians:
-        mu, quat, log_scale = unbind(plain, g.face, bind(turned, g.face, g.mu, g.quat, g.log_scale))
-        out.append(replace(g, mu=mu, quat=quat, log_scale=log_scale))
-    return out
+    return Drift(turned, face_frames(rest, poses.body.faces))
 
 
 def turn_back(pose: np.ndarray, turns: np.ndarray, parents: np.ndarray) -> np.ndarray:

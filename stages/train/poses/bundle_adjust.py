@@ -7,6 +7,7 @@ untrained frames are corrected like those around them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -39,34 +40,52 @@ MIDWAY_ROUNDS, MIDWAY_SHARE = 2, 0.3
 """Rounds midway through a training, and the share of TURN and SHIFT that is still their sigma."""
 
 
-def correct_midway(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaussians], face: np.ndarray,
-                   views: dict[int, View]) -> bool:
+Equations = Callable[[Gaussians], list[tuple[int, NormalEquations]]]
+"""Of gaussians: each frame with its normal equations, the poses as they stand."""
+
+
+def correct_midway(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaussians],
+                   opened: AbstractContextManager[Equations]) -> bool:
     """Corrects all poses midway through a training, when the avatar constrains them better than at the start.
 
-    trained: (n,) indices of frames; gaussians: returns them as they stand; face: (N,) of the gaussians. Returns whether it did:
-    not where views `are_apart`.
+    trained: (n,) indices of frames; gaussians: returns them as they stand; opened: the equations, not yet entered. Returns whether
+    it did: not where views `are_apart`.
     """
     if are_apart(poses.fit_pose[trained, 0]):
         return False
     everywhere = carry_to_untrained(poses, trained)
     poses.pose[:], poses.transl[:] = everywhere.pose, everywhere.transl
-    corrections = Corrections(poses, gaussians, face, views, MIDWAY_SHARE)
-    for _ in range(MIDWAY_ROUNDS):
-        corrections.solve()
+    with opened as equations:
+        corrections = Corrections(poses, gaussians, equations, MIDWAY_SHARE)
+        for _ in range(MIDWAY_ROUNDS):
+            corrections.solve()
     poses.settle()
     return True
+
+
+class FrameEquations:
+    """`Equations` on the CPU, the frames side by side."""
+
+    def __init__(self, poses: Poses, face: np.ndarray, views: dict[int, View]):
+        """face: (N,) of the gaussians; views: frame -> view."""
+        self.poses, self.views, self.share = poses, views, joint_shares(poses.body, face)
+
+    def __call__(self, gaussians: Gaussians) -> list[tuple[int, NormalEquations]]:
+        def of_frame(frame: tuple[int, View], workspace: Workspace) -> tuple[int, NormalEquations]:
+            t, view = frame
+            return t, normal_equations(gaussians, self.share, self.poses, t, view, workspace)
+
+        return side_by_side(of_frame, self.views.items())
 
 
 class Corrections:
     """The corrections of T frames, as one array (T, U): turns (TURNING, 3) rad after the first rotations, and shifts (3,) m."""
 
-    def __init__(self, poses: Poses, gaussians: Callable[[], Gaussians], face: np.ndarray, views: dict[int, View],
-                 share: float = 1.0):
-        """gaussians: returns them as they stand; face: (N,) of them; views: frame -> view; share: of TURN and SHIFT."""
-        self.poses, self.gaussians, self.views = poses, gaussians, views
+    def __init__(self, poses: Poses, gaussians: Callable[[], Gaussians], equations: Equations, share: float = 1.0):
+        """gaussians: returns them as they stand; share: of TURN and SHIFT."""
+        self.poses, self.gaussians, self.equations = poses, gaussians, equations
         self.first_pose, self.first_transl = poses.pose.copy(), poses.transl.copy()
         frames = len(poses.pose)
-        self.share = joint_shares(poses.body, face)
         self.root = np.linalg.cholesky(covariance(frames))
         self.spread = share * np.append(np.full(3 * TURNING, TURN), np.full(3, SHIFT))
         self.values = np.zeros((frames, UNKNOWNS))
@@ -100,15 +119,6 @@ class Corrections:
         self.values = before + np.clip((root @ z) * spread - before, -MOST, MOST)
         require_finite("after a round of poses", {"correction of the poses": self.values})
         self.place()
-
-    def equations(self, gaussians: Gaussians) -> list[tuple[int, NormalEquations]]:
-        """Frame and its normal equations, in the order of the views."""
-
-        def of_frame(frame: tuple[int, View], workspace: Workspace) -> tuple[int, NormalEquations]:
-            t, view = frame
-            return t, normal_equations(gaussians, self.share, self.poses, t, view, workspace)
-
-        return side_by_side(of_frame, self.views.items())
 
     def place(self) -> None:
         """Sets the poses to the corrected ones."""

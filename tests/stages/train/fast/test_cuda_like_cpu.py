@@ -183,3 +183,28 @@ def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, m
     (pose, transl, quality), (expected_pose, expected_transl, target) = found
     assert relative(pose, expected_pose) < 0.3 and relative(transl, expected_transl) < 0.3
     assert abs(quality - target) < 0.4
+
+
+def test_the_poses_equations_are_the_cpus_as_gaussians_surface_and_poses_move_and_the_same_bytes_each_time():
+    from gsac.benchmarks.gpu.check import relative
+    from gsac.stages.train.fast.cpu import Cpu
+    from gsac.stages.train.fast.cuda import Cuda
+    from gsac.stages.train.fast.initial_gaussians import init_gaussians
+
+    task, random = turning((5,), size=(101, 130)), np.random.default_rng(0)
+    poses, views = task.poses, {int(t): task.views[int(t)] for t in task.trained}
+    gaussians = init_gaussians(task, views, 2500)
+    gaussians.light = LIGHT
+    with Cuda().open_equations(task, gaussians, views) as on_gpu, Cpu().open_equations(task, gaussians, views) as on_cpu:
+        for _ in range(2):
+            found, again, expected = on_gpu(gaussians), on_gpu(gaussians), on_cpu(gaussians)
+            for (t, own), (_, same), (other, plain) in zip(found, again, expected, strict=True):
+                assert t == other and abs(own.pixels - plain.pixels) < 3
+                assert relative(own.gradient, plain.gradient) < 1e-3 and relative(own.hessian, plain.hessian) < 1e-3
+                assert own.error == pytest.approx(plain.error, rel=1e-4)
+                for one, two in zip(own, same, strict=True):
+                    np.testing.assert_array_equal(one, two)
+            poses.pose += random.normal(0, 0.02, poses.pose.shape)
+            poses.transl += random.normal(0, 0.01, poses.transl.shape)
+            poses.offset += np.float32(random.normal(0, 0.002, poses.offset.shape))
+            gaussians.mu += np.float32(random.normal(0, 0.2, gaussians.mu.shape))

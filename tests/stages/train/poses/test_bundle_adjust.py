@@ -89,7 +89,8 @@ def test_a_step_that_made_the_images_worse_is_taken_back(job):
     task = task_of(job(frames=3))
     views = {t: person_crop(task.views[t]).halved() for t in range(3)}
     trainer = Trainer(init_gaussians(task, views, 600), task)
-    solving = bundle_adjust.Corrections(task.poses, trainer.gaussians, trainer.face, views)
+    solving = bundle_adjust.Corrections(task.poses, trainer.gaussians,
+                                        bundle_adjust.FrameEquations(task.poses, trainer.face, views))
     solving.solve()
     good = solving.kept.copy()
     solving.values = np.full_like(good, 0.5)
@@ -108,7 +109,7 @@ def test_rounds_in_the_midst_correct_held_out_frames_too_and_become_the_base_of_
     for step, t in enumerate(np.tile(task.trained, 6)):
         trainer.learn([Step(int(t), views[int(t)], 0.3, np.ones(3), step)])
     poses.transl[:, 0] += TRUE_SHIFT / 2
-    bundle_adjust.correct_midway(poses, task.trained, trainer.gaussians, trainer.face, views)
+    bundle_adjust.correct_midway(poses, task.trained, trainer.gaussians, Cpu().open_equations(task, trainer.gaussians(), views))
     off = np.abs(poses.transl[:, 0]) / (TRUE_SHIFT / 2)
     assert off.max() < 0.9 and off[task.choosing].mean() < 0.85, "they are taken to be off by little, and so move little"
     np.testing.assert_array_equal(poses.base_transl, poses.transl)
@@ -126,7 +127,7 @@ def test_photos_far_apart_keep_the_poses_of_the_fit(job):
     task = task_of(job(frames=6))
     prealign.adjust(task, Cpu())
     np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
-    bundle_adjust.correct_midway(task.poses, task.trained, None, None, {})
+    bundle_adjust.correct_midway(task.poses, task.trained, None, None)
     np.testing.assert_array_equal(task.poses.pose, task.poses.fit_pose)
     assert not bundle_adjust.are_apart(task.poses.fit_pose[:1, 0])
 

@@ -1,0 +1,24 @@
+"""The end of every level: on bones turned back, on faces that carry its gaussians where joints bend, without strays there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.gaussians import joint_faces, joint_strays
+from gsac.stages.train.poses.bone_drift import remove_drift
+from gsac.stages.train.poses.poses import Poses
+
+
+class Finish:
+    """Finishes levels, one at a time; first removes the drift from the poses."""
+
+    def __init__(self, poses: Poses, trained: np.ndarray):
+        """trained: (n,) indices of frames."""
+        self.drift = remove_drift(poses, trained)
+        self.carried = joint_faces.bend(poses, trained)
+        self.seen = joint_strays.bend(poses, trained)
+
+    def __call__(self, gaussians: Gaussians) -> Gaussians:
+        """The gaussians, of the poses as they were, as they are handed out."""
+        return joint_strays.shrink_strays(joint_faces.hold_at_joints(self.drift.undo(gaussians), self.carried), self.seen)
