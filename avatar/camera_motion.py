@@ -5,7 +5,7 @@ A plain wall has no points, and leaves in the wind, a screen or a person who wal
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -24,12 +24,19 @@ CELLS, MOST_IN_CELL = 8, 4
 SEARCH = {"winSize": (15, 15), "maxLevel": 3, "criteria": (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 20, 0.03)}
 BACK, AGREE = 0.5, 0.7
 """px by which a point that is followed there and back may miss itself, and by which points that move as one may differ."""
-LEAST_POINTS, LEAST_SHARE, LEAST_CELLS, LEAST_SPAN = 12, 0.5, 8, 0.4
-"""What must move as one: of how many points, which share, in how many cells, over which share of width and of height."""
+FAINT, DISTINCT = 0.005, 0.9
+"""Least contrast of points that are found by what they look like, and the largest distance of two that are taken for one, over that
+of the next best: many are wrong, but only right ones move as one."""
+LEAST_POINTS, LEAST_CELLS, LEAST_SPAN = 12, 8, 0.4
+"""How many points there must be, in how many cells those must be that move as one, over which share of width and of height."""
+LEAST_SHARE, LEAST_FOUND = 0.5, 0.25
+"""Share of the points that must move as one: of those followed, and of those found again."""
 LEAST_KNOWN = 0.5
 """Share of the frames that must be known."""
 MOVED, LEAST_MOVED = 0.003, 2
 """Shares of the longer side from which on the camera has moved, and in how many frames at least: one may be an error."""
+STAYS = 0.4
+"""Share of the frames in one place from which on it is the camera's own."""
 
 
 @dataclass
@@ -56,9 +63,10 @@ def make_view(image: np.ndarray, alpha: np.ndarray) -> View:
 
 
 def measure_sway(views: Iterable[View]) -> np.ndarray:
-    """Returns (T,) px, distance of the frame's background from its median place; NaN where that is unknown.
+    """Returns (T,) px, distance of the frame's background from the place where it mostly is; NaN where that is unknown.
 
-    A frame is compared with the first one, and from where that is out of sight with the last one that is known.
+    A frame is compared with the first one, and from where that is out of sight with the last one that is known. After a jump,
+    across which no point can be followed, points are looked for everywhere.
     """
     anchor = last = None
     places: list[np.ndarray] = []
@@ -68,6 +76,8 @@ def measure_sway(views: Iterable[View]) -> np.ndarray:
         if found is None and last is not anchor:
             anchor = last
             found = chain(anchor, view)
+        if found is None:
+            found = chain(last, view, find_again, LEAST_FOUND)
         if found is not None:
             last = (view, found)
             known += 1
@@ -78,7 +88,16 @@ def measure_sway(views: Iterable[View]) -> np.ndarray:
         places.append(quarter_points(view, found))
     if known < max(2, LEAST_KNOWN * len(places)):
         return np.full(len(places), np.nan)
-    return np.linalg.norm(places - np.nanmedian(places, axis=0), axis=2).mean(1)
+    return np.linalg.norm(places - find_home(np.array(places), MOVED * max(view.grey.shape) / view.scale), axis=2).mean(1)
+
+
+def find_home(places: np.ndarray, near: float) -> np.ndarray:
+    """places: (T, 4, 2) px or NaN; near: px. Returns (4, 2), the place with most others near it where those are many, else the
+    median."""
+    apart = np.linalg.norm(places[:, None] - places, axis=3).mean(2)
+    count = (apart <= near).sum(1)
+    most = int(count.argmax())
+    return places[most] if count[most] >= STAYS * np.isfinite(apart.diagonal()).sum() else np.nanmedian(places, axis=0)
 
 
 def find_moved(sway: np.ndarray, longer: int) -> np.ndarray:
@@ -87,10 +106,39 @@ def find_moved(sway: np.ndarray, longer: int) -> np.ndarray:
     return moved & (moved.sum() >= LEAST_MOVED)
 
 
-def chain(start: tuple[View, np.ndarray] | None, view: View) -> np.ndarray | None:
-    """start: a view, and the (3, 3) similarity from the first one to it. Returns that from the first one to `view`; None where
-    it is unknown."""
-    step = follow(start[0], view) if start is not None else None
+Pairs = tuple[np.ndarray, np.ndarray]
+"""(n, 2) float32 px x, y of points of one view, and where they are in another."""
+
+
+def follow(before: View, after: View) -> Pairs:
+    """Corners of the background that are followed from one view to the other, and back to where they were."""
+    start = find_corners(before)
+    if len(start) < LEAST_POINTS:
+        return start, start
+    end, forth = cv2.calcOpticalFlowPyrLK(before.grey, after.grey, start, np.empty_like(start), **SEARCH)[:2]
+    again, back = cv2.calcOpticalFlowPyrLK(after.grey, before.grey, end, np.empty_like(start), **SEARCH)[:2]
+    kept = (forth[:, 0] > 0) & (back[:, 0] > 0) & (np.linalg.norm(again - start, axis=1) < BACK)
+    return start[kept], end[kept]
+
+
+def find_again(before: View, after: View) -> Pairs:
+    """Points of the background that are found by what they look like, each the other's best, wherever and however large."""
+    sift, matcher = cv2.SIFT_create(contrastThreshold=FAINT), cv2.BFMatcher()
+    (start, first), (end, second) = (sift.detectAndCompute(view.grey, view.free.astype(np.uint8)) for view in (before, after))
+    if min(len(start), len(end)) < LEAST_POINTS:
+        return np.zeros((0, 2), np.float32), np.zeros((0, 2), np.float32)
+    back = [match.trainIdx for match in matcher.match(second, first)]
+    found = [best for best, other in matcher.knnMatch(first, second, k=2)
+             if best.distance < DISTINCT * other.distance and back[best.trainIdx] == best.queryIdx]
+    return (np.array([start[match.queryIdx].pt for match in found], np.float32).reshape(-1, 2),
+            np.array([end[match.trainIdx].pt for match in found], np.float32).reshape(-1, 2))
+
+
+def chain(start: tuple[View, np.ndarray] | None, view: View,
+          pair: Callable[[View, View], Pairs] = follow, share: float = LEAST_SHARE) -> np.ndarray | None:
+    """start: a view, and the (3, 3) similarity from the first one to it; share: of the pairs, that must move as one. Returns the
+    similarity from the first one to `view`; None where it is unknown."""
+    step = agree(*pair(start[0], view), start[0], view, share) if start is not None else None
     return None if start is None or step is None else step @ start[1]
 
 
@@ -102,38 +150,40 @@ def quarter_points(view: View, place: np.ndarray | None) -> np.ndarray:
     return np.full((4, 2), np.nan) if place is None else (points @ place.T)[:, :2] / view.scale
 
 
-def follow(before: View, after: View) -> np.ndarray | None:
-    """The (3, 3) similarity by which the background moves from one view to the other; None where too little moves as one."""
-    start, cell = find_corners(before)
-    if len(start) < LEAST_POINTS:
-        return None
-    end, forth = cv2.calcOpticalFlowPyrLK(before.grey, after.grey, start, np.empty_like(start), **SEARCH)[:2]
-    again, back = cv2.calcOpticalFlowPyrLK(after.grey, before.grey, end, np.empty_like(start), **SEARCH)[:2]
+def agree(start: np.ndarray, end: np.ndarray, before: View, after: View, share: float) -> np.ndarray | None:
+    """start, end: pairs (n, 2) px of points of two views; share: of them, that must move as one. Returns the (3, 3) similarity by
+    which the background moves; None where too little does."""
     size = np.array(after.grey.shape[::-1])
     column, row = np.clip(np.round(end), 0, size - 1).astype(int).T
-    kept = ((forth[:, 0] > 0) & (back[:, 0] > 0) & (np.linalg.norm(again - start, axis=1) < BACK)
-            & (end >= 0).all(1) & (end < size).all(1) & after.free[row, column])
+    kept = (end >= 0).all(1) & (end < size).all(1) & after.free[row, column]
     if kept.sum() < LEAST_POINTS:
         return None
-    found, agree = cv2.estimateAffinePartial2D(start[kept], end[kept], method=cv2.RANSAC, ransacReprojThreshold=AGREE)
+    found, as_one = cv2.estimateAffinePartial2D(start[kept], end[kept], method=cv2.RANSAC, ransacReprojThreshold=AGREE)
     if found is None:
         return None
-    agree = agree[:, 0] > 0
-    low, high = np.quantile(start[kept][agree], (0.05, 0.95), axis=0)
-    if agree.mean() < LEAST_SHARE or len(np.unique(cell[kept][agree])) < LEAST_CELLS or ((high - low) < LEAST_SPAN * size).any():
+    as_one = as_one[:, 0] > 0
+    low, high = np.quantile(start[kept][as_one], (0.05, 0.95), axis=0)
+    cells = cell_of(*start[kept][as_one].T, before)
+    if as_one.mean() < share or len(np.unique(cells)) < LEAST_CELLS or ((high - low) < LEAST_SPAN * size).any():
         return None
     return np.vstack([found, (0, 0, 1)])
 
 
-def find_corners(view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Returns (n, 2) float32 px x, y of the background's corners, and (n,) the cell of each: the strongest ones of every cell."""
+def cell_of(x: np.ndarray, y: np.ndarray, view: View) -> np.ndarray:
+    """x, y: (n,) px. Returns (n,) int, the cell that each point lies in."""
+    height, width = view.grey.shape
+    return (y * CELLS // height * CELLS + x * CELLS // width).astype(int)
+
+
+def find_corners(view: View) -> np.ndarray:
+    """Returns (n, 2) float32 px x, y of the background's corners, the strongest ones of every cell."""
     strength = cv2.cornerMinEigenVal(view.grey, PATCH)
     inside = np.zeros_like(view.free)
     inside[RIM:-RIM, RIM:-RIM] = view.free[RIM:-RIM, RIM:-RIM]
     y, x = np.nonzero(inside & (strength > CORNER) & (strength == cv2.dilate(strength, np.ones((PATCH + 2, PATCH + 2)))))
-    cell = y * CELLS // len(strength) * CELLS + x * CELLS // strength.shape[1]
+    cell = cell_of(x, y, view)
     order = np.lexsort((-strength[y, x], cell))
     x, y, cell = x[order], y[order], cell[order]
     first = np.searchsorted(cell, cell)
     few = np.arange(len(cell)) - first < MOST_IN_CELL
-    return np.stack([x, y], 1)[few].astype(np.float32), cell[few]
+    return np.stack([x, y], 1)[few].astype(np.float32)

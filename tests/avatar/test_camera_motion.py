@@ -80,6 +80,21 @@ def test_sway_a_pan_and_a_zoom_are_measured_to_two_px(camera, most):
     assert find_moved(found, HEIGHT).sum() >= T // 2
 
 
+def zoom_step(by):
+    return lambda t: cv2.getRotationMatrix2D((WIDTH / 2, HEIGHT / 2), 0, 1 + by * (t >= 7))
+
+
+def bump(px):
+    return lambda t: np.array([[1, 0, px * PX * (t >= 7)], [0, 1, 0.0]])
+
+
+@pytest.mark.parametrize(("camera", "px"), [(bump(60), 60), (bump(220), 220), (zoom_step(0.1), 37), (zoom_step(0.25), 92)])
+def test_a_jump_is_measured_whole_and_only_the_frames_after_it_are_named(camera, px):
+    sway = measure_sway(film(furnished, camera)) / PX
+    assert find_moved(sway, HEIGHT / PX).tolist() == [False] * 7 + [True] * 5
+    assert np.nanmax(sway) == pytest.approx(px, rel=0.1)
+
+
 @pytest.mark.parametrize("room", [furnished, plain, shadow, screen, leaves])
 @pytest.mark.parametrize("grain", [0, 8])
 def test_no_shadow_screen_leaves_or_grain_before_a_still_camera_is_taken_for_its_motion(room, grain):
