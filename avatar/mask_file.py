@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 LEAST_SHOWN = 0.5
-"""A mask without a pixel of so much alpha shows nobody."""
+"""A mask without a pixel of so much alpha shows nobody, one with no pixel of less tells nobody from the scene."""
 NEARLY = 0.01
 """By how much an EXR's alpha may leave 0..1, as resampling makes it, and the colours of a grey picture may differ."""
 SAME_ASPECT = 0.01
@@ -20,7 +20,7 @@ class MaskError(ValueError):
 
 
 def read_mask(path: Path) -> np.ndarray:
-    """(H, W) float32 in 0..1. MaskError where the file is no mask, or shows nobody."""
+    """(H, W) float32 in 0..1. MaskError where the file is no mask, or shows nobody or nothing else."""
     name = f"{path.parent.name}/{path.name}"
     try:
         pixels = _read_exr(path) if path.suffix.lower() == ".exr" else _read_picture(path)
@@ -33,6 +33,8 @@ def read_mask(path: Path) -> np.ndarray:
         raise MaskError(f"{name}: has values from {mask.min():g} to {mask.max():g}; expected 0 to 1")
     if mask.max() < LEAST_SHOWN:
         raise MaskError(f"{name}: is empty, no pixel of it is white; expected the person in white, or cut the clip where nobody is")
+    if mask.min() >= LEAST_SHOWN:
+        raise MaskError(f"{name}: is white all over; expected the person in white and all else in black")
     return np.clip(mask, 0, 1)
 
 

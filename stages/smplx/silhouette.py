@@ -42,7 +42,7 @@ class Outline:
     scale: float
     """Full-size pixels per field pixel."""
     area: float
-    """Share of the frame that the person covers; 0 without a person."""
+    """Share of the frame that the person covers; 0 without a person, or where all of it is the person: there is no outline."""
     mask: np.ndarray  # (h, w) bool
     hidden: np.ndarray | None = None
     """(h, w) bool, where something stands before the person; None: nowhere."""
@@ -67,11 +67,12 @@ def read_outline(path: Path) -> Outline:
 
 
 def make_outline(alpha: np.ndarray) -> Outline:
-    """Makes the field of one alpha, (H, W) in 0..1."""
+    """Makes the field of one alpha, (H, W) in 0..1; of one without an edge, it tells nothing."""
     scale = max(alpha.shape[0] / FIELD_HEIGHT, 1.0)
     size = (max(2, round(alpha.shape[1] / scale)), max(2, round(alpha.shape[0] / scale)))
     small = cv2.resize(alpha, size, interpolation=cv2.INTER_AREA)
     mask = small > 0.5
+    mask &= not mask.all()  # how far it is to an edge that is nowhere would be infinite
     outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
     inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
     field = (cv2.GaussianBlur(outside - inside, (0, 0), 1.0) * scale).astype(np.float32)

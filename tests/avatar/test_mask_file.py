@@ -47,3 +47,11 @@ def test_a_smaller_mask_grows_about_its_pixels_middles_and_a_larger_one_is_avera
     assert abs((grown * columns).sum() / grown.sum() - 48) < 0.01
     with pytest.raises(MaskError, match="is 96x160 px, of another aspect than its frame, which is 96x96"):
         scale_mask(mask, 96, 96, tmp_path / "0.png")
+
+
+@pytest.mark.parametrize(("value", "words"), [(0, "masks/0.png: is empty"), (255, "masks/0.png: is white all over")])
+def test_a_mask_of_nobody_and_one_of_nothing_else_are_refused_by_name(tmp_path, value, words):
+    (tmp_path / "masks").mkdir()
+    Image.fromarray(np.full((8, 6), value, np.uint8)).save(tmp_path / "masks/0.png")
+    with pytest.raises(MaskError, match=words):
+        read_mask(tmp_path / "masks/0.png")

@@ -16,7 +16,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.fit import fit_clip
 from gsac.stages.smplx.sightings import Sightings
-from gsac.stages.smplx.silhouette import Outline, read_outline, sample_outlines
+from gsac.stages.smplx.silhouette import Outline, make_outline, read_outline, sample_outlines
 from gsac.stages.smplx.state import to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
 
@@ -119,3 +119,8 @@ def test_one_wrong_detection_is_no_furniture(body, person, tmp_path):
     seen, outlines = sightings_of(body, person), outlines_of(body, person, tmp_path)
     seen.xy[3, ANKLES] += (120, 0)
     assert find_occluder(seen, outlines) is None
+
+
+@pytest.mark.parametrize("value", [0, 1])
+def test_an_alpha_without_an_edge_tells_nothing(value):
+    assert make_outline(np.full((64, 48), value, np.float32)).area == 0
