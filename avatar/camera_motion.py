@@ -123,7 +123,7 @@ def follow(before: View, after: View) -> Pairs:
 
 def find_again(before: View, after: View) -> Pairs:
     """Points of the background that are found by what they look like, each the other's best, wherever and however large."""
-    sift, matcher = cv2.SIFT_create(contrastThreshold=FAINT), cv2.BFMatcher()
+    sift, matcher = cv2.SIFT.create(contrastThreshold=FAINT), cv2.BFMatcher()
     (start, first), (end, second) = (sift.detectAndCompute(view.grey, view.free.astype(np.uint8)) for view in (before, after))
     if min(len(start), len(end)) < LEAST_POINTS:
         return np.zeros((0, 2), np.float32), np.zeros((0, 2), np.float32)
@@ -163,16 +163,16 @@ def agree(start: np.ndarray, end: np.ndarray, before: View, after: View, share: 
         return None
     as_one = as_one[:, 0] > 0
     low, high = np.quantile(start[kept][as_one], (0.05, 0.95), axis=0)
-    cells = cell_of(*start[kept][as_one].T, before)
+    cells = cell_of(start[kept][as_one], before)
     if as_one.mean() < share or len(np.unique(cells)) < LEAST_CELLS or ((high - low) < LEAST_SPAN * size).any():
         return None
     return np.vstack([found, (0, 0, 1)])
 
 
-def cell_of(x: np.ndarray, y: np.ndarray, view: View) -> np.ndarray:
-    """x, y: (n,) px. Returns (n,) int, the cell that each point lies in."""
-    height, width = view.grey.shape
-    return (y * CELLS // height * CELLS + x * CELLS // width).astype(int)
+def cell_of(points: np.ndarray, view: View) -> np.ndarray:
+    """points: (n, 2) px x, y. Returns (n,) int, the cell that each lies in."""
+    column, row = (points * CELLS // np.array(view.grey.shape[::-1])).astype(int).T
+    return row * CELLS + column
 
 
 def find_corners(view: View) -> np.ndarray:
@@ -181,7 +181,7 @@ def find_corners(view: View) -> np.ndarray:
     inside = np.zeros_like(view.free)
     inside[RIM:-RIM, RIM:-RIM] = view.free[RIM:-RIM, RIM:-RIM]
     y, x = np.nonzero(inside & (strength > CORNER) & (strength == cv2.dilate(strength, np.ones((PATCH + 2, PATCH + 2)))))
-    cell = cell_of(x, y, view)
+    cell = cell_of(np.stack([x, y], 1), view)
     order = np.lexsort((-strength[y, x], cell))
     x, y, cell = x[order], y[order], cell[order]
     first = np.searchsorted(cell, cell)

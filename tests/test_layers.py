@@ -22,7 +22,7 @@ BELOW = {
 }
 """Package -> those it may import; lowest first."""
 SHARED_BY_STAGES = {"contract", "body_choice", "brought_file", "counting", "findings", "first_look", "frame_names",
-                    "missing_frames", "severity"}
+                    "missing_frames", "severity", "turn_pace"}
 
 
 def modules(package: str) -> dict[str, Path]:

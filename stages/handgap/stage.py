@@ -14,6 +14,7 @@ from gsac.stages.handgap.missing_hands import SIDES, MissingHands, find_missing,
 from gsac.stages.handgap.paper_rule import find_missing_as_paper
 from gsac.stages.handgap.sigma import detection_sigma, person_height
 from gsac.stages.missing_frames import read_keypoints
+from gsac.stages.turn_pace import pace
 
 RULES = {"places": find_missing, "paper": find_missing_as_paper}
 """handgap.rule -> the function that finds missing hands."""
@@ -27,6 +28,7 @@ def run(job: Job) -> None:
     keypoints, lacking = read_keypoints(job.inputs["keypoints/keypoints.npz"], None if times is None else len(times))
     if lacking.any():
         job.warn(Finding.of(Code.POINTS_MISSING, lacking))
+    times = None if times is None else pace(times, keypoints["world"].astype(np.float64))
     xy = keypoints["xy"].astype(np.float64)
     score = keypoints["score"].astype(np.float64)
     own = clip.shows_own_moment(len(xy))

@@ -27,6 +27,7 @@ from gsac.stages.smplx.start.bring import bring_start
 from gsac.stages.smplx.start.fit import take_as_fit
 from gsac.stages.smplx.state import Fit, to_params
 from gsac.stages.smplx.warmup import rehearse
+from gsac.stages.turn_pace import pace
 
 
 def fit_as_published(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
@@ -55,8 +56,8 @@ def run(job: Job) -> None:
     face = check_face(job.inputs["face/face.npz"])
     body = load_body(job, "smplx")
     shared = read_shared(job, body)
-    sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"],
-                          None if clip.timestamps_s is None else np.array(clip.timestamps_s), clip.width, clip.height,
+    times = None if clip.timestamps_s is None else pace(np.array(clip.timestamps_s), points["world"])
+    sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"], times, clip.width, clip.height,
                           clip.focal_px, find_errors(job, body, str(points["detector"])), face, points["missing"],
                           clip.principal_point, clip.longer_side)
     seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
