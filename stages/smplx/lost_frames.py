@@ -18,9 +18,22 @@ BESIDE, FEW = 0.003, 2
 clips have 0.001 at most, pictures whose last row is a twentieth of a turn later than their first up to 0.005."""
 MOSTLY = 0.5
 """Share of frames of low IoU from which on pictures do not tell where an arm is: where they mix three moments 0.6 to 0.8."""
+BODY = slice(0, 17)
+"""Of the points, COCO's, with the wrists but not the hands."""
+SURE, LEAST = 0.2, 4
+"""Score of a body point that counts, and how many show a person."""
 REPEATED = "the picture is an earlier frame's"
 FAR = 0.05
 """Median reprojection error of a lost frame, as a share of the person's height; a good fit has a tenth of it."""
+
+
+def find_seen(score: np.ndarray, filled: np.ndarray) -> np.ndarray:
+    """(T,) bool, frames with four body points, one of which was detected: filled hands alone are nobody.
+
+    score: (T, 133); filled: (T, 133) bool.
+    """
+    found = score[:, BODY] > SURE
+    return (found.sum(1) >= LEAST) & (found & ~filled[:, BODY].astype(bool)).any(1)
 
 
 def find_lost_frames(fit: Fit, seen: np.ndarray, height: float, own: np.ndarray) -> dict[str, np.ndarray]:

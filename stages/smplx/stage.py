@@ -19,8 +19,9 @@ from gsac.stages.smplx.detector_errors import find_errors
 from gsac.stages.smplx.expression import translate_expression, translate_rest
 from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
+from gsac.stages.smplx.lm.hidden_arms import describe_arms
 from gsac.stages.smplx.lm.misleading_outlines import fit_unmisled
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, find_seen
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
 from gsac.stages.smplx.start.bring import bring_start
@@ -60,7 +61,7 @@ def run(job: Job) -> None:
     sightings = Sightings(points["xy"], points["score"], points["sigma"], points["world"], times, clip.width, clip.height,
                           clip.focal_px, find_errors(job, body, str(points["detector"])), face, points["missing"],
                           clip.principal_point, clip.longer_side)
-    seen = (points["score"][:, :17] > 0.2).sum(1) >= 4
+    seen = find_seen(points["score"], points["filled"])
     if not seen.any():
         raise StageError("no frame shows four body points; the clip needs one whole person in view")
     masks = pair_masks([path.stem for path in frame_paths(job.inputs["split/frames"])], job.inputs["segment/alpha"])
@@ -90,8 +91,9 @@ def run(job: Job) -> None:
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = find_lost_frames(fit, seen, sightings.person_height, own)
-    params.sigma_joints[np.any(list(lost.values()), axis=0)] = LOST
-    for finding in (*fit.notes, *hidden, *describe_lost_frames(lost, fit)):
+    fitted = ~np.any(list(lost.values()), axis=0)
+    params.sigma_joints[~fitted] = LOST
+    for finding in (*fit.notes, *describe_arms(fit.arms, fitted), *hidden, *describe_lost_frames(lost, fit)):
         job.warn(finding)
     if (doubt := doubt_focal(job.config, clip, float(params.focal[0]))) is not None:
         job.warn(doubt)

@@ -8,7 +8,7 @@ import numpy as np
 
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
-from gsac.stages.findings import Finding
+from gsac.stages.findings import Code, Finding
 
 
 @dataclass
@@ -50,6 +50,8 @@ class Fit:
     joint_offset: np.ndarray | None = None  # (55, 3) m, where the method moves joints
     notes: tuple[Finding, ...] = ()
     """Sentences for the user."""
+    arms: dict[Code, np.ndarray] = field(default_factory=dict)
+    """What is to be said of arms -> (T, 2) bool, in which frames, left and right."""
     cost: float = np.nan
     """By `lm`, of all but the fingers."""
     uncovered: np.ndarray | None = None

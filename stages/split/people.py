@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gsac.avatar.artifacts import frame_paths, read_frame
 from gsac.avatar.blazepose import Pose, PoseNetworks
 from gsac.avatar.region import Region
 from gsac.stages.split.crop import Extent, plan_crop
@@ -97,6 +98,15 @@ def find_extent(people: People, pictures: Iterable[np.ndarray], width: int, heig
         if plan_crop(extent, width, height, max_height) is None:
             return None
     return extent if people.known else None
+
+
+def find_shown(people: People, frames: Path, asked: np.ndarray) -> np.ndarray:
+    """(T,) bool: those of the asked frames that show somebody. frames: their folder; asked: (T,) bool."""
+    shown, paths = np.zeros(len(asked), bool), frame_paths(frames)
+    for t in np.flatnonzero(asked):
+        people.start_anew()
+        shown[t] = people.look(read_frame(paths[t])) is not None
+    return shown
 
 
 def squares(width: int, height: int) -> list[Region]:

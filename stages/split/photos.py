@@ -6,6 +6,7 @@ import contextlib
 import io
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import plan_crop, principal_point
 from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, PLATE, VIDEO_SUFFIXES, find_plates
-from gsac.stages.split.people import People, find_extent
+from gsac.stages.split.people import People, find_extent, find_shown
 from gsac.stages.split.pick import fit_size, pick_evenly, turn_size
 from gsac.stages.split.picture_quality import HEIGHT, judge_pictures, look_at
 from gsac.stages.split.upright import LARGE_ENOUGH, LOOKS, describe_quarters, find_quarters, turn
@@ -116,7 +117,8 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
         if had_alpha:
             notes.add(COMPOSITED)
         write_frame(frames / "plate.png", fit(turn(rgb, quarters), Image.Exif())[0])
-    repeated, findings = judge_pictures(looks, timed=moments is not None)
+    find = None if people is None else partial(find_shown, people, frames)
+    repeated, findings = judge_pictures(looks, moments is not None, find)
     for finding in findings:
         warn(finding)
     known = [f for f in focals if f is not None]

@@ -5,6 +5,7 @@ Each picture is looked at small and forgotten; what is kept of it are the means 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -145,23 +146,34 @@ def find_blurred(sharpness: np.ndarray) -> np.ndarray:
     return (sharpness[:, 0] < BLURRED) | softer.any(1)
 
 
-def judge_pictures(looks: list[Look], timed: bool) -> tuple[np.ndarray, list[Finding]]:
-    """Repeated frames (T,) bool, and what is wrong with the pictures. timed: whether they are of a video: photos repeat nothing."""
+def judge_pictures(looks: list[Look], timed: bool,
+                   find_shown: Callable[[np.ndarray], np.ndarray] | None = None) -> tuple[np.ndarray, list[Finding]]:
+    """Repeated frames (T,) bool, and what is wrong with the pictures.
+
+    timed: whether they are of a video: photos repeat nothing; find_shown: of some frames (T,) bool, those that show somebody: an
+    empty room stands still and may be plain; None: all do.
+    """
     blocks, findings = np.stack([look.blocks for look in looks]), []
     repeated = find_repeats(blocks) if timed else np.zeros(len(looks), bool)
     frozen = np.zeros(len(looks), bool)
     for first, last in runs_of_frames(repeated):
         frozen[first:last + 1] = last - first + 1 >= FROZEN
+    single = repeated & ~frozen
+    sharpness = np.stack([look.sharpness for look in looks])
+    blurred = find_blurred(sharpness)
+    doubted = frozen | blurred
+    if find_shown is not None and doubted.any() and not doubted.all():
+        shown = find_shown(doubted)
+        frozen, blurred = frozen & shown, blurred & shown
     if frozen.any():
         findings.append(Finding.of(Code.FROZEN, frozen, figure=frozen.sum()))
-    if (repeated & ~frozen).mean() > MANY_REPEATED:
-        findings.append(Finding.of(Code.REPEATED, repeated & ~frozen, figure=(repeated & ~frozen).sum()))
+    if single.mean() > MANY_REPEATED:
+        findings.append(Finding.of(Code.REPEATED, single, figure=single.sum()))
     if timed and (cuts := find_scene_cuts(blocks)).any():
         findings.append(Finding.of(Code.SCENE_CUT, cuts, figure=cuts.sum()))
     gains = measure_exposure(blocks)
     if (steps := find_exposure_steps(gains)).any():
         findings.append(Finding.of(Code.EXPOSURE_STEPS, steps, figure=np.exp(np.abs(gains[steps]).max()) - 1))
-    sharpness = np.stack([look.sharpness for look in looks])
-    if (blurred := find_blurred(sharpness)).any():
+    if blurred.any():
         findings.append(Finding.of(Code.BLURRED, blurred, figure=sharpness[blurred, 0].min()))
     return repeated, findings

@@ -28,7 +28,7 @@ from gsac.stages.split.decoding import Chains, find_alone
 from gsac.stages.split.keyframes import read_key_frames
 from gsac.stages.split.masks import match_frames, write_masks
 from gsac.stages.split.mirrored import find_mirrored, turn_back
-from gsac.stages.split.people import People, find_extent
+from gsac.stages.split.people import People, find_extent, find_shown
 from gsac.stages.split.photos import write_plate_of_video
 from gsac.stages.split.pick import fit_size, pick_by_time, pick_evenly
 from gsac.stages.split.picture_quality import HEIGHT, Look, judge_pictures, look_at
@@ -121,7 +121,8 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         mask_of = match_frames(masks, len(times), picks)
         write_masks(frames, [mask_of[int(at)] for at in np.searchsorted(video.ticks, shown)], (video.width, video.height), crop,
                     frame_size(video, config, crop), mirrored & (crop is None), video.quarters)
-    repeated, findings = judge_pictures(looks, timed=True)
+    find = None if people is None else partial(find_shown, people, frames)
+    repeated, findings = judge_pictures(looks, True, find)
     if crop is not None:
         repeated |= mirrored
     for finding in findings:

@@ -23,7 +23,7 @@ from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, measure_uncovered, move, settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
-from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, describe_arms, widen_arm
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, widen_arm
 from gsac.stages.smplx.lm.hidden_search import search_hidden
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
@@ -91,9 +91,9 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         widen_arm(sigma, side, doubtful[:, [side]])
     chain = problem.skeleton.pose(state.local, state.shape)
     said += find_unseen_sway(state.local[:, 0], chain.place + state.transl[:, None])
-    said += describe_arms(Code.HAND_HIDDEN, hidden.mark(len(sigma))) + describe_arms(Code.ARM_DOUBTFUL, doubtful)
     return Fit(state, sigma, iou, measure_reprojection(problem, state), steps + more,
-               problem.person_offsets.joint_offset(state.own), tuple(said), cost,
+               problem.person_offsets.joint_offset(state.own), tuple(said),
+               {Code.HAND_HIDDEN: hidden.mark(len(sigma)), Code.ARM_DOUBTFUL: doubtful}, cost,
                measure_uncovered(hidden, problem, state, np.arange(len(sigma))))
 
 

@@ -305,9 +305,10 @@ def find_around(seconds: np.ndarray, first: int, last: int) -> tuple[int, int]:
     return int(near[0]), int(near[-1]) + 1
 
 
-def describe_arms(code: Code, arms: np.ndarray) -> list[Finding]:
-    """A finding for each side that has frames. arms: (T, 2) bool."""
-    return [Finding.of(code, own, figure=own.sum(), side=side) for side, own in zip(SIDES, arms.T, strict=True) if own.any()]
+def describe_arms(arms: dict[Code, np.ndarray], fitted: np.ndarray) -> list[Finding]:
+    """A finding for each side that has frames. arms: code -> (T, 2) bool; fitted: (T,) bool: of others nothing is said."""
+    found = [(code, side, own & fitted) for code, both in arms.items() for side, own in zip(SIDES, both.T, strict=True)]
+    return [Finding.of(code, own, figure=own.sum(), side=side) for code, side, own in found if own.any()]
 
 
 def widen_arm(sigma: np.ndarray, side: int, share: np.ndarray) -> None:

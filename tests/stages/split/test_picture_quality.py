@@ -29,8 +29,8 @@ def film(step: float = 3.0, frames: int = FRAMES) -> list[np.ndarray]:
     return pictures
 
 
-def judge(pictures, timed=True):
-    repeated, findings = judge_pictures([look_at(picture) for picture in pictures], timed)
+def judge(pictures, timed=True, find_shown=None):
+    repeated, findings = judge_pictures([look_at(picture) for picture in pictures], timed, find_shown)
     return np.flatnonzero(repeated).tolist(), {finding.code: finding for finding in findings}
 
 
@@ -95,6 +95,24 @@ def test_a_blurred_clip_and_a_few_frames_that_moved_sideways_are_named():
     assert judge(soft)[1][Code.BLURRED].frames == [[0, 23]]
     shaken = [cv2.blur(p, (9, 1)) if 5 <= t < 8 else p for t, p in enumerate(film())]
     assert judge(shaken)[1][Code.BLURRED].frames == [[5, 7]]
+
+
+def test_an_empty_room_is_not_said_to_stand_still_or_to_be_blurred_and_somebody_is_looked_for_only_in_doubt():
+    nobody, asked = np.arange(FRAMES) < 8, []
+
+    def find_shown(frames):
+        asked.append(np.flatnonzero(frames).tolist())
+        return frames & ~nobody
+
+    empty = again([np.zeros_like(film()[0])] + [cv2.GaussianBlur(room(1), (0, 0), 2.5)] * 7, *range(2, 8))
+    repeated, found = judge([*empty, *film()[8:]], find_shown=find_shown)
+    assert repeated == list(range(2, 8)) and not found.keys() & {Code.FROZEN, Code.BLURRED, Code.REPEATED}
+    repeated, found = judge([*empty, *again(film(), *range(12, 16))[8:]], find_shown=find_shown)
+    assert found[Code.FROZEN].frames == [[12, 15]] and repeated[-4:] == list(range(12, 16))
+    assert len(asked) == 2 and not {*range(16, FRAMES)} & {*asked[0], *asked[1]}
+    assert judge(film(), find_shown=find_shown) == ([], {}) and len(asked) == 2
+    soft = [cv2.GaussianBlur(p, (0, 0), 2.5) for p in film()]
+    assert judge(soft, find_shown=pytest.fail)[1][Code.BLURRED].frames == [[0, 23]]
 
 
 def test_a_plain_picture_is_not_called_blurred():

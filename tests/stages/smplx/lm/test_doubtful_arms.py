@@ -50,7 +50,7 @@ def test_a_hand_that_is_not_detected_for_most_of_a_turn_is_doubted(fitted):
     missing[3:12, 1] = True
     found = find_untold(*fitted, missing)
     assert np.flatnonzero(found[:, 1]).tolist() == list(range(3, 12)) and not found[:, 0].any()
-    (finding,) = describe_arms(Code.ARM_DOUBTFUL, found)
+    (finding,) = describe_arms({Code.ARM_DOUBTFUL: found}, np.ones(len(found), bool))
     assert (finding.code, finding.frames) == (Code.ARM_DOUBTFUL, [[3, 11]]) and "right arm" in finding.message
 
 

@@ -17,7 +17,7 @@ from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm import hidden_search
 from gsac.stages.smplx.lm.fit import fit_clip, fit_points, set_up
-from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, QUICK, STILL, HiddenArms, Stay, bridge, find_usual
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, QUICK, STILL, HiddenArms, Stay, bridge, describe_arms, find_usual
 from gsac.stages.smplx.lm.hidden_arms import WRIST as WRIST_ROW
 from gsac.stages.smplx.lm.hidden_search import search_hidden
 from gsac.stages.smplx.silhouette import read_outline
@@ -61,8 +61,17 @@ def test_a_hand_behind_the_back_lies_behind_the_back(fitted):
 
 def test_a_hidden_hand_is_named_with_side_and_frames(fitted):
     _, fit, _ = fitted
-    assert [(n.code, n.frames) for n in fit.notes] == [(Code.HAND_HIDDEN, [[0, 6]])]
-    assert "left hand" in fit.notes[0].message
+    (finding,) = describe_arms(fit.arms, np.ones(FRAMES, bool))
+    assert (finding.code, finding.frames) == (Code.HAND_HIDDEN, [[0, 6]]) and "left hand" in finding.message
+
+
+def test_of_frames_that_show_nobody_or_are_not_fitted_no_arm_is_said_to_be_hidden_or_in_doubt():
+    arms, fitted = {code: np.zeros((8, 2), bool) for code in (Code.HAND_HIDDEN, Code.ARM_DOUBTFUL)}, np.arange(8) > 2
+    arms[Code.HAND_HIDDEN][:3, 0] = arms[Code.ARM_DOUBTFUL][:3] = True
+    assert describe_arms(arms, fitted) == []
+    arms[Code.ARM_DOUBTFUL][2:6, 1] = True
+    (finding,) = describe_arms(arms, fitted)
+    assert (finding.code, finding.frames, finding.figure) == (Code.ARM_DOUBTFUL, [[3, 5]], 3) and "right arm" in finding.message
 
 
 def test_the_sigma_of_a_hidden_arm_tells_how_far_off_it_may_be(fitted):
