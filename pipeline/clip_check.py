@@ -94,7 +94,7 @@ def check_clip(clip: Path, keypoints: Path, findings: list[tuple[str, dict[str, 
     times, look = Clip.read(clip).timestamps_s, FirstLook.of(check_keypoints(keypoints))
     sparse = times is not None and len(times) > 1 and (times[-1] - times[0]) / (len(times) - 1) > SPARSE_S
     found = [pair for pair in findings if not (sparse and pair[1]["code"] in BY_NEIGHBOURS)]
-    turn = look.turn * look.frames / max(look.frames - 1, 1)  # the clip shows what lies between those frames, too
+    turn = look.turn if times is None else look.turn * look.frames / max(look.frames - 1, 1)  # a video shows what lies between, too
     if look.frames > 1 and turn < LEAST_TURN:
         part = Finding.of(Code.PART_OF_TURN, figure=turn)
         found.append((part.message, part.to_json()))
