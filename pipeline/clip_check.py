@@ -98,7 +98,7 @@ def check_clip(clip: Path, keypoints: Path, findings: list[tuple[str, dict[str, 
     empty = set().union(*(list_frames(entry) for _, entry in findings if entry["code"] == Code.NO_PERSON.word))
     found = [(message, entry) for message, entry in findings if not (
         sparse and entry["code"] in BY_NEIGHBOURS or entry["code"] in BY_ABSENCE and list_frames(entry) <= empty)]
-    turn = look.turn * look.frames / max(look.frames - 1, 1)  # the clip shows what lies between those frames, too
+    turn = look.turn if times is None else look.turn * look.frames / max(look.frames - 1, 1)  # a video shows what lies between, too
     if look.frames > 1 and turn < LEAST_TURN:
         part = Finding.of(Code.PART_OF_TURN, figure=turn)
         found.append((part.message, part.to_json()))

@@ -8,8 +8,8 @@ from typing import Any
 from gsac.pipeline.report.results import number
 
 TURN, HANDS, ENDS, PERSON, OUTLINE, CUT_OUT = 270.0, 0.5, 0.8, 0.95, 0.85, 0.95
-"""Least degrees of the turn; least share of the frames that show each hand, head and feet, a person; least IoU of the fitted
-body's and of the avatar's outline."""
+"""Least degrees of the turn; least share of the frames with a person that show each hand, head and feet; least share of the frames
+with a person; least IoU of the fitted body's and of the avatar's outline."""
 FEW_PHOTOS, DARK, BLURRED, FACE_PX = 10, 0.14, 1.0, 24
 """Least photos, brightness of the person (0..1), sharpness, and px of the face's box."""
 

@@ -176,6 +176,8 @@ def headline(results: Results, facts: dict[str, float]) -> dict[str, Any]:
         metrics, absent = results.metrics, ""
     except AbsentError as reason:
         metrics, absent = {}, str(reason)
+    if (turn := number(metrics.get("turn_degrees"))) is not None:
+        facts = facts | {"turn_degrees": turn}  # of the frames that have a mask as well
     return {"verdict": give_verdict(metrics, facts) if metrics else None, "advice": give_advice(metrics, facts), "absent": absent,
             "person": describe_person(results, facts), "weak": weaknesses(metrics, facts),
             "figures": list_figures(results, metrics)}

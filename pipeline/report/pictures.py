@@ -98,6 +98,11 @@ class Crop:
         return (xy - (self.x0, self.y0)) * (np.array(self.size) / (self.x1 - self.x0, self.y1 - self.y0))
 
 
+def is_found(k: dict[str, np.ndarray]) -> np.ndarray:
+    """(T, 133) bool: the point was found in the image, not filled. k: arrays of keypoints.npz, (T, 133, ...)."""
+    return (k["score"] >= SEEN) & ~k["filled"] if "filled" in k else k["score"] >= SEEN
+
+
 class Footage:
     """Frames, masks and keypoints of one run, read once."""
 
@@ -132,6 +137,18 @@ class Footage:
             return check_arrays(self.results.path("face/face.npz"), {"valid": ("T",)})["valid"].astype(bool)
         except (AbsentError, ArtifactError):
             return None
+
+    @cached_property
+    def person_found(self) -> np.ndarray:
+        """(T,) bool, frames in which the detector found a point of the body; what handgap filled is none. All, without readable
+        points."""
+        count = len(self.frames)
+        try:
+            k = self.keypoints
+        except (AbsentError, ArtifactError):
+            return np.ones(count, bool)
+        found = is_found(k)[:, BODY].any(1)
+        return np.concatenate([found, np.zeros(count, bool)])[:count]
 
     def frame(self, t: int) -> np.ndarray:
         """Frame t, (H, W, 3) uint8."""

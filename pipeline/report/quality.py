@@ -27,8 +27,8 @@ def input_weaknesses(facts: dict[str, float]) -> list[str]:
         if seen == 0:
             found.append(f"The {side} hand was never seen; its pose is a guess.")
         elif seen < HAND:
-            found.append(f"The {side} hand was seen in {seen:.0%} of the frames (another {filled:.0%} were filled from "
-                         "their neighbours).")
+            found.append(f"The {side} hand was seen in {seen:.0%} of the frames with a person (another {filled:.0%} were "
+                         "filled from their neighbours).")
     if facts.get("face_share") == 0:
         found.append("The face was never seen; its shape and expression are the average's.")
     elif facts.get("face_used") == 0:

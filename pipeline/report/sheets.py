@@ -15,9 +15,20 @@ from gsac.avatar.camera_motion import find_moved, make_view, measure_sway
 from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
 from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta
-from gsac.pipeline.report.pictures import EXACT, QUALITIES, SEEN, Footage, Picture, make_picture, shrink_to_fit, spread_evenly
+from gsac.pipeline.report.pictures import (
+    EXACT,
+    QUALITIES,
+    SEEN,
+    Footage,
+    Picture,
+    is_found,
+    make_picture,
+    shrink_to_fit,
+    spread_evenly,
+)
 from gsac.pipeline.report.results import AbsentError, Results, number
 from gsac.stages.counting import counted
+from gsac.stages.frame_names import name_frames
 
 CONTACT, KEYPOINTS, ALPHA, BODIES, HELDOUT, FACES = 12, 8, 8, 8, 8, 3
 """How many frames each sheet shows at most."""
@@ -78,27 +89,33 @@ def keypoint_sheet(footage: Footage) -> Sheet:
         pictures.append(make_picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}", frame=t))
     figures = {"Detector": str(k["detector"]), "Of stage": "handgap" if "filled" in k else "keypoints",
                "Frames": str(len(k["xy"]))}
-    facts = {"person_share": float((k["score"][:, BODY] >= SEEN).any(1).mean())}
+    person = np.any(is_found(k)[:, BODY], 1)
+    facts = {"person_share": float(person.mean()), "feet_share": share_of(person, np.any(is_found(k)[:, FEET], 1))}
     figures["Person found"] = percent(facts["person_share"])
-    facts["feet_share"] = float((k["score"][:, FEET] >= SEEN).any(1).mean())
+    parts = {}
     for side, part in HANDS.items():
-        facts[f"{side}_hand_share"] = found = float(is_part_seen(k, part).mean())
-        figures[f"{side.capitalize()} hand found"] = percent(found)
+        parts[f"{side}_hand_share"] = f"{side.capitalize()} hand found", is_part_seen(k, part)
         if "filled" in k:
-            facts[f"{side}_hand_filled"] = float(k["filled"][:, part].any(1).mean())
-            figures[f"{side.capitalize()} hand filled"] = percent(facts[f"{side}_hand_filled"])
-    facts["face_share"] = float(is_part_seen(k, FACE).mean())
-    figures["Face found"] = percent(facts["face_share"])
+            parts[f"{side}_hand_filled"] = f"{side.capitalize()} hand filled", k["filled"][:, part].any(1)
+    parts["face_share"] = "Face found", is_part_seen(k, FACE)
     if footage.face_valid is not None:
-        facts["face_used"] = float(footage.face_valid.mean())
-        figures["Face used for shape and expression"] = percent(facts["face_used"])
+        parts["face_used"] = "Face used for shape and expression", footage.face_valid
+    of = "" if person.all() else " of the frames with a person"
+    for fact, (name, frames) in parts.items():
+        facts[fact] = share_of(person, frames)
+        figures[name] = percent(facts[fact]) + of
     return Sheet(pictures, figures, facts)
+
+
+def share_of(person: np.ndarray, frames: np.ndarray) -> float:
+    """The share of the frames with a person, (T,) bool, that is among others, (T,) bool; 0 without a person."""
+    count = min(len(person), len(frames))
+    return float(frames[:count][person[:count]].mean()) if person[:count].any() else 0.0
 
 
 def is_part_seen(k: dict[str, np.ndarray], part: slice) -> np.ndarray:
     """(T,) bool: the part was found in the image, not filled. k: arrays of keypoints.npz, (T, 133, ...)."""
-    found = (k["score"][:, part] >= SEEN).mean(1) >= 0.5
-    return found & ~k["filled"][:, part].any(1) if "filled" in k else found
+    return is_found(k)[:, part].mean(1) >= 0.5
 
 
 def hand_state(k: dict[str, np.ndarray], t: int, i: int, side: str) -> str:
@@ -132,8 +149,13 @@ def alpha_sheet(footage: Footage) -> Sheet:
     """The person cut out, on magenta."""
     crop = footage.crop(WIDE, HIGH)
     masks = {p.stem for p in frame_paths(footage.results.path("segment/alpha"))}
+    lacking = np.array([path.stem not in masks for path in footage.frames])
+    if lacking.all():
+        raise AbsentError("segment/alpha has no mask for any frame.")
+    chosen = np.flatnonzero(~lacking)
+    chosen = chosen[spread_evenly(len(chosen), ALPHA)].tolist()
     pictures, covers, soft, looks, views, cut = [], [], [], [], [], []
-    for t in spread_evenly(len(footage.frames), ALPHA):
+    for t in chosen:
         alpha = footage.alpha(t)
         looks.append(measure_light(footage.frame(t), alpha))
         views.append(make_view(footage.frame(t), alpha))
@@ -142,8 +164,8 @@ def alpha_sheet(footage: Footage) -> Sheet:
         soft.append(float(((alpha > 0.02) & (alpha < 0.98)).sum() / max((alpha >= 0.5).sum(), 1)))
         pictures.append(make_picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
                                 f"{footage.moment(t)}: covers {percent(covers[-1])}", f"Frame {t} cut out, on magenta", frame=t))
-    missing = sum(path.stem not in masks for path in footage.frames)
-    facts = {"empty_masks": float(sum(c < LEAST_MASK for c in covers))}
+    empty = [t for t, cover in zip(chosen, covers, strict=True) if cover < LEAST_MASK]
+    facts = {"empty_masks": float(footage.person_found[empty].sum())}
     for name, values in zip(("brightness", "sharpness"), zip(*looks, strict=True), strict=True):
         if np.isfinite(values).any():
             facts[name] = float(np.nanmedian(values))
@@ -158,10 +180,10 @@ def alpha_sheet(footage: Footage) -> Sheet:
         facts["moved_frames"] = float(find_moved(sway, max(footage.clip.width, footage.clip.height)).sum())
         figures["Camera moved, among the frames shown"] = (
             f"{np.nanmax(sway):.0f} px" if np.isfinite(sway).any() else "not known: too plain a background")
-    if missing:
-        figures["Frames without a mask"] = str(missing)
-    if facts["empty_masks"]:
-        figures["Empty masks among those shown"] = f"{int(facts['empty_masks'])} of {len(covers)}"
+    if lacking.any():
+        figures["No mask, and not shown"] = name_frames(lacking)
+    if empty:
+        figures["Empty masks among those shown"] = f"{len(empty)} of {len(covers)}"
     return Sheet(pictures, figures, facts)
 
 
@@ -205,7 +227,8 @@ def body_sheet(footage: Footage) -> Sheet:
     full = params.camera(width, height)
     camera = full.scaled(round(width * crop.scale), round(height * crop.scale))
     frames = spread_evenly(min(len(footage.frames), params.frames, len(k["xy"])), BODIES)
-    pictures, overlaps, misses = [], [], []
+    fitted = footage.person_found[:params.frames] & ~params.lost[:len(footage.frames)]
+    pictures, overlaps, misses = [], [], [np.zeros(0)]
     for t in frames:
         vertices = body.posed(params, [t])[0][0]
         face_id = rasterise(vertices, body.faces, camera)[0]
@@ -215,14 +238,17 @@ def body_sheet(footage: Footage) -> Sheet:
         image = draw_body(small, vertices, body.faces, face_id)
         scale = np.array((camera.width / width, camera.height / height))
         draw_reprojection(image, k["xy"][t] * scale, projected * scale, shown)
-        misses.append(np.linalg.norm(k["xy"][t] - projected, axis=1)[: FEET.stop][shown[: FEET.stop]])
-        caption, overlap = footage.moment(t), silhouette_iou(footage, t, face_id)
-        if overlap is not None:
-            overlaps.append(overlap)
-            caption += f": outline IoU {overlap:.2f}"
+        caption = footage.moment(t)
+        if not fitted[t]:
+            caption += ": not fitted" if footage.person_found[t] else ": no person was found"
+        else:
+            misses.append(np.linalg.norm(k["xy"][t] - projected, axis=1)[: FEET.stop][shown[: FEET.stop]])
+            if (overlap := silhouette_iou(footage, t, face_id)) is not None:
+                overlaps.append(overlap)
+                caption += f": outline IoU {overlap:.2f}"
         x0, y0, x1, y1 = (round(v * crop.scale) for v in (crop.x0, crop.y0, crop.x1, crop.y1))
         pictures.append(make_picture(image[y0:y1, x0:x1], caption, f"Fitted body over frame {t}", frame=t))
-    return body_figures(Sheet(pictures), body, params, full.focal[0], np.concatenate(misses), overlaps)
+    return body_figures(Sheet(pictures), body, params, fitted, np.concatenate(misses), overlaps)
 
 
 def silhouette_iou(footage: Footage, t: int, face_id: np.ndarray) -> float | None:
@@ -236,13 +262,14 @@ def silhouette_iou(footage: Footage, t: int, face_id: np.ndarray) -> float | Non
     return float((mask & (face_id >= 0)).sum() / either) if either else None
 
 
-def body_figures(sheet: Sheet, body: Body, params: BodyParams, focal: float, misses: np.ndarray, overlaps: list[float]) -> Sheet:
-    """The sheet with its figures. focal: px; misses: (n,) px between detected and projected points; overlaps: silhouette IoUs."""
+def body_figures(sheet: Sheet, body: Body, params: BodyParams, fitted: np.ndarray, misses: np.ndarray,
+                 overlaps: list[float]) -> Sheet:
+    """The sheet with its figures. fitted: (T,) bool, frames with a person and a fitted body; misses: (n,) px between detected and
+    projected points; overlaps: silhouette IoUs."""
     rest = body.rest(params.betas)[0]
-    sheet.facts = {"turn_degrees": turn_seen(rotation.exp(params.global_orient.astype(float))),
-                   "height_m": float(np.ptp(rest[:, 1]))}
-    sheet.figures = {"Height": f"{sheet.facts['height_m']:.2f} m", "Focal length": f"{focal:.0f} px",
-                     "Turn seen": f"{sheet.facts['turn_degrees']:.0f} of 360 degrees"}
+    turns = rotation.exp(params.global_orient[:len(fitted)][fitted].astype(float))
+    sheet.facts = {"turn_degrees": turn_seen(turns), "height_m": float(np.ptp(rest[:, 1]))}
+    sheet.figures = {"Height": f"{sheet.facts['height_m']:.2f} m", "Focal length": f"{params.focal[0]:.0f} px"}
     if len(misses):
         sheet.facts["reprojection_px"] = float(np.median(misses))
         sheet.figures["Joint reprojection, median of the frames shown"] = f"{sheet.facts['reprojection_px']:.1f} px"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from gsac.pipeline.report.advice import BLURRED, DARK
+from gsac.pipeline.report.advice import BLURRED, DARK, TURN
 from gsac.pipeline.report.results import number
 
 
@@ -82,9 +82,9 @@ class Verdict:
 def give_verdict(metrics: dict[str, Any], facts: dict[str, float]) -> Verdict:
     """metrics: train's metrics.json, {} without one; facts: figures of the sheets, as far as measured."""
     grades = {part: grade_likeness(part, metrics, facts) for part in LIKENESS}
-    grades |= {"seen": grade_seen(metrics), "moves": grade_moves(metrics)}
+    grades |= {"seen": grade_seen(metrics, facts), "moves": grade_moves(metrics)}
     whole = grade_whole(grades)
-    parts = tuple(Part(NAMES[part], grade, say_seen(metrics) if part == "seen" else say_part(part, grade, metrics))
+    parts = tuple(Part(NAMES[part], grade, say_seen(metrics, facts) if part == "seen" else say_part(part, grade, metrics))
                   for part, grade in grades.items())
     return Verdict(whole, say_in_one_line(grades), parts)
 
@@ -104,12 +104,13 @@ def grade_likeness(part: str, metrics: dict[str, Any], facts: dict[str, float]) 
     return next(grade for grade in (Grade.GOOD, Grade.FAIR, Grade.POOR) if grade.rank <= max(rank, 0))
 
 
-def grade_seen(metrics: dict[str, Any]) -> Grade:
-    """How much of the body's surface the frames show."""
+def grade_seen(metrics: dict[str, Any], facts: dict[str, float]) -> Grade:
+    """How much of the body's surface the frames show; fair at best of a part of a turn, which shows much of it from aside."""
     share = number(metrics.get("seen_area"))
     if share is None:
         return Grade.UNKNOWN
-    return Grade.GOOD if share >= SEEN[0] else Grade.FAIR if share >= SEEN[1] else Grade.POOR
+    all_round = facts.get("turn_degrees", TURN) >= TURN
+    return Grade.GOOD if share >= SEEN[0] and all_round else Grade.FAIR if share >= SEEN[1] else Grade.POOR
 
 
 def grade_moves(metrics: dict[str, Any]) -> Grade:
@@ -138,13 +139,15 @@ def say_part(part: str, grade: Grade, metrics: dict[str, Any]) -> str:
     return SENTENCES[part][grade] + where
 
 
-def say_seen(metrics: dict[str, Any]) -> str:
-    """How much of the surface the frames show."""
+def say_seen(metrics: dict[str, Any], facts: dict[str, float]) -> str:
+    """How much of the surface the frames show, and of a part of a turn from how many degrees."""
     share = number(metrics.get("seen_area"))
     if share is None:
         return "How much of the body the frames show is not known."
     rest = "" if share >= SEEN[0] else " The rest has the colours of what lies around it."
-    return f"The frames show {share:.0%} of the body's surface.{rest}"
+    turn = facts.get("turn_degrees", TURN)
+    from_part = f", from {turn:.0f} of 360 degrees" if turn < TURN else ""
+    return f"The frames show {share:.0%} of the body's surface{from_part}.{rest}"
 
 
 def say_in_one_line(grades: dict[str, Grade]) -> str:

@@ -112,7 +112,7 @@ def run(job: Job) -> None:
             raise BadInput(f"train.lpips is {config.lpips}, but {why}; set train.lpips to judge")
         job.warn(Finding.of(Code.NO_LPIPS, why=why))
 
-    run = Run(job, Poses(body, params), camera, views, trained, held, choosing)
+    run = Run(job, Poses(body, params), camera, views, trained, held, choosing, turn)
     run.fit()
     if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
         job.warn(Finding.of(Code.PART_UNSEEN, parts=", ".join(parts)))
@@ -168,12 +168,12 @@ class Run:
     """One training: the recipe under a clock with its curve and checkpoints, and the files and figures of its result."""
 
     def __init__(self, job: Job, poses: Poses, camera: Camera, views: list[View], trained: np.ndarray, held: np.ndarray,
-                 choosing: np.ndarray):
+                 choosing: np.ndarray, turn: float):
         """camera: of the frames on disk; views: (T,), to train on, emptied after that. Indices of frames: trained (n,); held (m,),
-        which are judged; choosing (c,), which the recipe chooses by.
+        which are judged; choosing (c,), which the recipe chooses by. turn: degrees of 360 from which these show the person.
         """
         self.job, self.poses, self.camera, self.views, self.trained, self.held = job, poses, camera, views, trained, held
-        self.choosing, self.trained_camera = choosing, views[0].frame
+        self.choosing, self.turn, self.trained_camera = choosing, turn, views[0].frame
         self.curve: list[dict] = []
         self.losses: list[float] = []
         self.aside = np.zeros(2)  # wall and CPU seconds spent on judging
@@ -369,7 +369,7 @@ class Run:
             "lpips_in_loss": self.in_loss == NETWORKS[0], **({"vgg_hed_in_loss": True} if self.in_loss == VGG_HED else {}),
             "levels": looking.result(),
             "likeness": likeness,
-            "seen_area": self.seen_area,
+            "seen_area": self.seen_area, "turn_degrees": self.turn,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **bending.result(),
             "curve": [{key: value for key, value in row.items() if key not in TIMES} for row in self.curve],

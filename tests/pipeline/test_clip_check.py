@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,17 @@ def test_of_frames_that_show_nobody_it_is_said_once(tmp_path, monkeypatch):
             Finding.of(Code.NOT_FITTED, empty, reason="no person is seen"), Finding.of(Code.EMPTY_MASK, more)]
     found = clip_check.check_clip(tmp_path / "clip.json", tmp_path, [(each.message, each.to_json()) for each in told]).findings
     assert [(entry["code"], entry["frames"]) for _, entry in found] == [("no_person", [[0, 1]]), ("empty_mask", [[0, 2]])]
+
+
+@pytest.mark.parametrize(("photos", "said"), [(2, ["part_of_turn"]), (3, ["part_of_turn"]), (4, ["part_of_turn"]), (7, [])])
+def test_between_photos_nothing_is_seen_and_between_the_frames_of_a_video_the_turn_goes_on(tmp_path, monkeypatch, photos, said):
+    monkeypatch.setattr(FirstLook, "of", lambda points: replace(LOOK, frames=photos, seen=photos, turn=360 * (1 - 1 / photos) - 1))
+    monkeypatch.setattr(clip_check, "check_keypoints", lambda path: {})
+    for times, expected in ((None, said), ([0.3 * t for t in range(photos)], [])):
+        Clip(None if times is None else 30.0, times, 90, 160, None, "0" * 64).write(tmp_path / "clip.json")
+        check = clip_check.check_clip(tmp_path / "clip.json", tmp_path, [])
+        assert [entry["code"] for _, entry in check.findings] == expected
+        assert check.prospect is (Prospect.POORER if expected else Prospect.GOOD)
 
 
 def test_a_run_stops_where_nothing_can_come_of_the_clip_and_goes_on_anyway(toy):

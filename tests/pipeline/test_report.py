@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.artifacts import Clip, read_frame, write_alpha, write_arrays, write_frame
-from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.viewer import browser as chromium
@@ -236,6 +236,59 @@ def test_hands_are_said_to_be_found_filled_or_missing_frame_by_frame(whole):
     assert "Left hand found 67 %" in text and "Right hand found 100 %" in text and "Left hand filled 17 %" in text
 
 
+@pytest.fixture
+def half_empty(copied):
+    """Nobody is in its last three frames: no points but a hand that was filled, empty masks."""
+    path = copied / "handgap/keypoints.npz"
+    k = dict(np.load(path))
+    k["score"][3:] = 0
+    k["missing"][3:] = True
+    for part in (INDEX["left_wrist"], HANDS["left"]):
+        k["score"][3:, part], k["filled"][3:, part] = 0.4, True
+    write_arrays(path, **k)
+    for t in range(3, T):
+        write_alpha(copied / f"segment/alpha/{t:06d}.exr", np.zeros((HEIGHT, WIDTH), np.float32))
+    return copied
+
+
+def test_frames_without_a_person_count_neither_for_the_turn_nor_for_hands_and_outline(half_empty):
+    page = page_of(half_empty)
+    head, points, body = (page.text(section) for section in ("head", "keypoints", "body"))
+    assert "seen over 120 of 360 degrees" in head and "Only 120 of 360 degrees" in head and Advice.TURN.value in head
+    assert "A person was found in only 50% of the frames." in head and "Person found 50 %" in points
+    assert "Left hand found 67 % of the frames with a person Left hand filled 33 % of the frames with a person" in points
+    assert "hand was seen" not in head and Advice.HANDS.value not in head
+    assert float(re.search(r"Outline IoU, mean of the frames shown ([\d.]+)", body)[1]) > 0.9
+    assert "0.13 s: no person was found" in body
+    assert Advice.ONE_PERSON.value in head and "Some masks are empty" not in head
+    assert not any(advice.value in head for advice in (Advice.WHOLE, Advice.BACKGROUND, Advice.CLOTHES))
+
+
+def test_the_turn_is_that_of_the_frames_that_training_used_and_a_part_of_one_is_not_seen_from_all_sides(copied):
+    metrics = json.loads((copied / "train/metrics.json").read_text())
+    (copied / "train/metrics.json").write_text(json.dumps(metrics | {"turn_degrees": 198.0}))
+    head = page_of(copied).text("head")
+    assert "seen over 198 of 360 degrees" in head and Advice.TURN.value in head and "seen from all sides fair" in head
+    assert "The frames show 97% of the body's surface, from 198 of 360 degrees." in head
+
+
+def test_a_frame_whose_fit_failed_adds_nothing_to_the_turn(copied):
+    params = BodyParams.read(copied / "smplx/body.npz")
+    params.sigma_joints[3:] = LOST
+    params.write(copied / "smplx/body.npz")
+    page = page_of(copied)
+    assert "seen over 120 of 360 degrees" in page.text("head") and "0.13 s: not fitted" in page.text("body")
+
+
+def test_a_frame_without_a_mask_costs_its_own_picture_and_is_named(copied):
+    (copied / "segment/alpha/000002.exr").unlink()
+    page = page_of(copied)
+    assert len(page.images("alpha")) == T - 1 and "No mask, and not shown frame 2" in page.text("alpha")
+    for path in (copied / "segment/alpha").iterdir():
+        path.unlink()
+    assert "segment/alpha has no mask for any frame." in page_of(copied).text("alpha")
+
+
 def test_the_worst_held_out_frame_is_named(whole):
     page = Page(whole / "report.html")
     assert "frame 4, 21.25 dB on the person (the worst frame)" in page.text("heldout")
@@ -364,8 +417,7 @@ def test_a_missing_or_torn_artifact_costs_its_own_section_only(copied, port, sec
         path.write_bytes(path.read_bytes()[:11])
     page = page_of(copied)
     if (port, damage) not in (("split/frames/000000.png", "gone"), ("handgap/keypoints.npz", "gone")):
-        assert "absent" in page.text(section) or "cannot be read" in page.text(section) or \
-            "could not be drawn" in page.text(section) or "no mask" in page.text(section)
+        assert any(words in page.text(section) for words in ("absent", "cannot be read", "could not be drawn", "No mask"))
     if section != "views":
         assert page.images("views")
     if section not in ("heldout", "training"):

@@ -153,6 +153,13 @@ def test_empty_masks_are_left_out_with_a_warning_that_names_the_frames(job_anywh
     assert not {2, 5} & set(figures["heldout_frames"])
 
 
+def test_the_turn_in_the_figures_is_that_of_the_warning_which_counts_no_empty_mask(job):
+    made = job(frames=6, blank=(2, 3), steps=2, gaussians=200, pose_test_steps=0)
+    run(made)
+    assert metrics(made)["turn_degrees"] == pytest.approx(180, abs=3)
+    assert any(f"from {metrics(made)['turn_degrees']:.0f} of 360 degrees" in w for w in made.warnings)
+
+
 @pytest.mark.slow
 def test_frames_without_a_fitted_body_are_neither_trained_on_nor_judged(job_anywhere):
     made = job_anywhere(steps=20, pose_test_steps=0)
