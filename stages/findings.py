@@ -115,7 +115,7 @@ class Code(Enum):
                      Severity.WRONG)
     NOTHING_MOVES = Wording("Nothing moves in all {figure} frames: the clip shows no more than one photo would.",
                             "Turn once round while the phone films, with no other program open on it.", Severity.WRONG)
-    TURNED_UPRIGHT = Wording("The person lies on the side in the footage; it was turned by a quarter to the {way}.",
+    TURNED_UPRIGHT = Wording("The person {lies} in the footage; it was turned by {way}.",
                              "Turn the clip in the phone's gallery if that is wrong.", Severity.NEWS)
     MIRRORED = Wording("The picture is mirrored in {frames}; these frames are {treated}.",
                        "Give one recording, without cuts and effects.", Severity.NEWS)
