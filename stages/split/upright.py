@@ -44,6 +44,12 @@ def find_quarters(people: People, pictures: Iterable[np.ndarray]) -> int:
     return next((quarters for quarters in (1, 2, 3) if told.count(quarters) > len(told) / 2), 0)
 
 
+def lies_on_side(people: People, picture: np.ndarray) -> bool:
+    """Whether the person of one picture (H, W, 3) uint8 lies on the side, and stands in the turned one."""
+    people.start_anew()
+    return _quarters_of(people, picture) in (1, 3)
+
+
 def _quarters_of(people: People, picture: np.ndarray) -> int | None:
     """Quarters by which the person of one picture (H, W, 3) stands; None where it shows nobody, or one who stands in no turn."""
     lean = people.lean(picture)

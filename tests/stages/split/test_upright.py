@@ -76,7 +76,7 @@ def split(source: Path, out: Path, **config):
     stage.run(Job({"clip": source}, out, SplitConfig(**config), models=dict.fromkeys(NETWORKS, Path()), warn=told.append))
     clip, frames = Clip.read(out / "clip.json"), [read_frame(path) for path in frame_paths(out / "frames")]
     assert {frame.shape for frame in frames} == {(clip.height, clip.width, 3)}
-    return frames, [finding for finding in told if finding.code is Code.TURNED_UPRIGHT]
+    return frames, [finding for finding in told if finding.code in (Code.TURNED_UPRIGHT, Code.LIES_ON_SIDE)]
 
 
 @pytest.mark.parametrize("quarters, way", [(1, "a quarter to the right"), (2, "a half"), (3, "a quarter to the left")])
@@ -149,6 +149,14 @@ def test_photos_are_turned_with_their_masks_and_plate(tmp_path, red_heads, quart
     assert np.array_equal(read_frame(tmp_path / "out/frames/plate.png"), person())
     for t, path in enumerate(frame_paths(tmp_path / "out/frames/masks")):
         np.testing.assert_allclose(read_alpha(path), mask(t) / 255, atol=0.01)
+
+
+def test_a_photo_that_lies_on_its_side_among_others_is_named(tmp_path, red_heads):
+    (tmp_path / "photos").mkdir()
+    for t in range(FRAMES):
+        Image.fromarray(np.rot90(person(t), t == 2)).save(tmp_path / f"photos/IMG_{t}.png")
+    frames, (told,) = split(tmp_path / "photos", tmp_path / "out")
+    assert told.code is Code.LIES_ON_SIDE and told.frames == [[2, 2]] and np.array_equal(frames[3], person(3))
 
 
 def test_who_lies_down_in_some_of_the_pictures_is_not_turned_and_who_stands_in_the_first_one_costs_one_look():
