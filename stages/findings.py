@@ -111,8 +111,11 @@ class Code(Enum):
                             "anew.", severity=Severity.NEWS)
     CHECKPOINT_UNREADABLE = Wording("The checkpoint {path} cannot be read ({error}); training starts anew.", severity=Severity.NEWS)
     FROZEN = Wording("The picture stands still in {frames} while time goes on; these frames are not used.",
-                     "Film without pausing, with no other program open on the phone.", Severity.WRONG)
-    TURNED_UPRIGHT = Wording("The person lies on the side in the footage; it was turned by a quarter to the {way}.",
+                     "Unless you held still there, film again without pausing, with no other program open on the phone.",
+                     Severity.WRONG)
+    NOTHING_MOVES = Wording("Nothing moves in all {figure} frames: the clip shows no more than one photo would.",
+                            "Turn once round while the phone films, with no other program open on it.", Severity.WRONG)
+    TURNED_UPRIGHT = Wording("The person {lies} in the footage; it was turned by {way}.",
                              "Turn the clip in the phone's gallery if that is wrong.", Severity.NEWS)
     MIRRORED = Wording("The picture is mirrored in {frames}; these frames are {treated}.",
                        "Give one recording, without cuts and effects.", Severity.NEWS)

@@ -22,7 +22,7 @@ from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, PLATE, VIDEO_SUFFIXES,
 from gsac.stages.split.people import People, find_extent, find_shown
 from gsac.stages.split.pick import fit_size, pick_evenly, turn_size
 from gsac.stages.split.picture_quality import HEIGHT, judge_pictures, look_at
-from gsac.stages.split.upright import LARGE_ENOUGH, LOOKS, describe_quarters, find_quarters, turn
+from gsac.stages.split.upright import LARGE_ENOUGH, LOOKS, describe_quarters, find_quarters, lies_on_side, turn
 
 UNSUPPORTED = {".dng", ".raw", ".cr2", ".nef"}
 FORMATS = ("JPEG", "PNG", "WEBP", "BMP", "TIFF")
@@ -84,7 +84,7 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
     if mask_of is not None:
         (frames / MASKS).mkdir()
     moments = None if config.photo_fps is None else dict(zip(photos, photo_times(photos, config.photo_fps), strict=True))
-    focals, times, looks, notes, other, unread = [], [], [], set(), [], []
+    focals, times, looks, notes, other, lying, unread = [], [], [], set(), [], [], []
     for done, path in enumerate(picks):
         try:
             rgb, exif, had_alpha = read_photo(path)
@@ -95,6 +95,9 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
             notes.add(COMPOSITED)
         if turn_size(rgb.shape[1], rgb.shape[0], quarters) != usual:
             other.append(path.name)
+        small = fit_size(rgb.shape[1], rgb.shape[0], LARGE_ENOUGH)
+        lying.append(people is not None and turn_size(rgb.shape[1], rgb.shape[0], quarters + 1) == usual != usual[::-1]
+                     and lies_on_side(people, turn(_resize(rgb, *small), quarters)))
         if mask_of is not None:
             mask = turn(mask_of(path, rgb.shape[1], rgb.shape[0]), quarters)
             write_alpha(frames / MASKS / f"{len(focals):06d}.exr", fit(mask, exif)[0])
@@ -112,6 +115,8 @@ def split_photos(photos: list[Path], plate: Path | None, frames: Path, config: S
     if other:
         warn(Finding.of(Code.PHOTO_SIZES, figure=len(other), given=len(picks), width=usual[0], height=usual[1],
                         names=", ".join(other)))
+    if any(lying):
+        warn(Finding.of(Code.LIES_ON_SIDE, np.array(lying)))
     if plate is not None:
         rgb, _, had_alpha = read_photo(plate)
         if had_alpha:

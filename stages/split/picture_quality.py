@@ -97,9 +97,14 @@ def find_repeats(blocks: np.ndarray) -> np.ndarray:
     where nothing moves all through the clip."""
     repeated, shown = np.zeros(len(blocks), bool), 0
     for t in range(1, len(blocks)):
-        repeated[t] = np.abs(blocks[t] - blocks[shown]).mean(-1).max() < STILL
+        repeated[t] = is_still(blocks[shown], blocks[t])
         shown = shown if repeated[t] else t
     return repeated & (shown > 0)
+
+
+def is_still(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(...) bool: whether pictures show what an earlier one shows. before: (h, w, 3); after: (..., h, w, 3); 0..255."""
+    return np.abs(after - before).mean(-1).max((-2, -1)) < STILL
 
 
 def find_scene_cuts(blocks: np.ndarray) -> np.ndarray:
@@ -165,6 +170,8 @@ def judge_pictures(looks: list[Look], timed: bool,
     if find_shown is not None and doubted.any() and not doubted.all():
         shown = find_shown(doubted)
         frozen, blurred = frozen & shown, blurred & shown
+    if timed and len(blocks) > FROZEN and is_still(blocks[0], blocks[1:]).all():
+        findings.append(Finding.of(Code.NOTHING_MOVES, figure=len(blocks)))
     if frozen.any():
         findings.append(Finding.of(Code.FROZEN, frozen, figure=frozen.sum()))
     if single.mean() > MANY_REPEATED:

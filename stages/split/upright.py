@@ -1,6 +1,7 @@
-"""Footage that lies on its side though its file does not say so: by how many quarters it has to be turned for its person to stand.
+"""Footage that lies on its side or is upside down though its file does not say so: by how many quarters it has to be turned for its
+person to stand.
 
-Phones store what they film across and tag it; who cuts a clip or sends it may lose the tag.
+Phones store what they film across or head down and tag it; who cuts a clip or sends it may lose the tag.
 """
 
 from __future__ import annotations
@@ -17,18 +18,19 @@ LOOKS = 5
 LARGE_ENOUGH = 640
 """px, height of these pictures, at most: the detector sees 224."""
 LYING = np.radians((60, 120))
-"""Lean of a trunk that lies: by 29 degrees it leans in squats, by 36 in a dance, by 76 and more where a camera was held across."""
+"""Lean of a trunk that lies: by 29 degrees it leans in squats, by 36 in a dance, by 76 and more where a camera was held across;
+beyond, it is upside down: by 152 and more in squats, by 173 in turns."""
 STANDING = np.radians(45)
 """Most lean of the trunk in the turned picture. Where the landmark network takes an empty room for somebody who lies, the turned
 room shows nobody, or somebody who hangs head down."""
-FILTERS: dict[int, list[str]] = {0: [], 1: ["transpose=cclock"], 3: ["transpose=clock"]}
+FILTERS: dict[int, list[str]] = {0: [], 1: ["transpose=cclock"], 2: ["hflip", "vflip"], 3: ["transpose=clock"]}
 """ffmpeg's filters for so many quarters, counter-clockwise as seen."""
 
 
 def find_quarters(people: People, pictures: Iterable[np.ndarray]) -> int:
-    """0, 1 or 3 quarters, counter-clockwise as seen. pictures: (H, W, 3) uint8 of the footage, spread evenly over it.
+    """0 to 3 quarters, counter-clockwise as seen. pictures: (H, W, 3) uint8 of the footage, spread evenly over it.
 
-    People who lie down in some of the pictures are not turned: most must lie, to the same side, and stand once turned.
+    People who lie down or stand on the head in some of the pictures are not turned: most must, the same way, and stand once turned.
     """
     told: list[int] = []
     for picture in pictures:
@@ -39,17 +41,23 @@ def find_quarters(people: People, pictures: Iterable[np.ndarray]) -> int:
             break
         told.append(quarters)
     people.start_anew()
-    return next((quarters for quarters in (1, 3) if told.count(quarters) > len(told) / 2), 0)
+    return next((quarters for quarters in (1, 2, 3) if told.count(quarters) > len(told) / 2), 0)
+
+
+def lies_on_side(people: People, picture: np.ndarray) -> bool:
+    """Whether the person of one picture (H, W, 3) uint8 lies on the side, and stands in the turned one."""
+    people.start_anew()
+    return _quarters_of(people, picture) in (1, 3)
 
 
 def _quarters_of(people: People, picture: np.ndarray) -> int | None:
-    """Quarters by which the person of one picture (H, W, 3) stands; None where it shows nobody, or somebody who hangs head down."""
+    """Quarters by which the person of one picture (H, W, 3) stands; None where it shows nobody, or one who stands in no turn."""
     lean = people.lean(picture)
-    if lean is None or abs(lean) > LYING[1]:
+    if lean is None:
         return None
     if abs(lean) < LYING[0]:
         return 0
-    quarters = 1 if lean > 0 else 3
+    quarters = 2 if abs(lean) > LYING[1] else 1 if lean > 0 else 3
     people.start_anew()
     after = people.lean(turn(picture, quarters))
     people.start_anew()
@@ -63,4 +71,7 @@ def turn(picture: np.ndarray, quarters: int) -> np.ndarray:
 
 def describe_quarters(quarters: int) -> Finding:
     """What the user is told."""
-    return Finding.of(Code.TURNED_UPRIGHT, figure=quarters, way="left" if quarters == 1 else "right")
+    if quarters == 2:
+        return Finding.of(Code.TURNED_UPRIGHT, figure=2, lies="is upside down", way="a half")
+    return Finding.of(Code.TURNED_UPRIGHT, figure=quarters, lies="lies on the side",
+                      way=f"a quarter to the {'left' if quarters == 1 else 'right'}")

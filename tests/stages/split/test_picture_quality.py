@@ -52,6 +52,7 @@ def test_a_picture_that_stands_still_is_used_once_and_its_frames_are_named():
     repeated, found = judge(again(film(), *range(8, 16)))
     assert repeated == list(range(8, 16))
     assert found.keys() == {Code.FROZEN} and found[Code.FROZEN].frames == [[8, 15]] and found[Code.FROZEN].figure == 8
+    assert "Unless you held still there" in found[Code.FROZEN].message, "a pause cannot be told from somebody who holds still"
 
 
 def test_a_picture_that_repeats_now_and_then_is_left_out_and_no_news():
@@ -68,10 +69,14 @@ def test_slow_motion_repeats_nothing_for_long():
     assert len(repeated) <= 30 and Code.FROZEN not in found
 
 
-@pytest.mark.parametrize("timed", [True, False])
-def test_where_nothing_moves_and_among_photos_nothing_repeats(timed):
-    pictures = film(0) if timed else again(film(), 4, 5, 6, 7)
-    assert judge(pictures, timed) == ([], {})
+def test_among_photos_nothing_repeats():
+    assert judge(again(film(), 4, 5, 6, 7), timed=False) == judge(film(0), timed=False) == ([], {})
+
+
+def test_a_clip_in_which_nothing_moves_says_so_and_keeps_its_frames():
+    repeated, found = judge(film(0))
+    assert repeated == [] and found.keys() == {Code.NOTHING_MOVES} and "all 24 frames" in found[Code.NOTHING_MOVES].message
+    assert judge(film(0, frames=3)) == ([], {})
 
 
 def test_another_scene_is_named_by_its_first_frame_and_a_flash_is_none():
@@ -116,7 +121,7 @@ def test_an_empty_room_is_not_said_to_stand_still_or_to_be_blurred_and_somebody_
 
 
 def test_a_plain_picture_is_not_called_blurred():
-    assert judge([np.full((HEIGHT, WIDTH, 3), 90, np.uint8)] * 6) == ([], {})
+    assert judge([np.full((HEIGHT, WIDTH, 3), 90, np.uint8)] * 6)[1].keys() == {Code.NOTHING_MOVES}
 
 
 def test_clip_json_lists_repeated_frames_and_says_nothing_where_there_are_none(tmp_path):

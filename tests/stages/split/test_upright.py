@@ -1,4 +1,4 @@
-"""Footage whose person lies on the side is turned until they stand, with all that lies beside it; other footage stays as it is."""
+"""Footage whose person lies on the side or is upside down is turned, with all that lies beside it; other footage stays as it is."""
 
 import os
 import subprocess
@@ -76,20 +76,19 @@ def split(source: Path, out: Path, **config):
     stage.run(Job({"clip": source}, out, SplitConfig(**config), models=dict.fromkeys(NETWORKS, Path()), warn=told.append))
     clip, frames = Clip.read(out / "clip.json"), [read_frame(path) for path in frame_paths(out / "frames")]
     assert {frame.shape for frame in frames} == {(clip.height, clip.width, 3)}
-    return frames, [finding for finding in told if finding.code is Code.TURNED_UPRIGHT]
+    return frames, [finding for finding in told if finding.code in (Code.TURNED_UPRIGHT, Code.LIES_ON_SIDE)]
 
 
-@pytest.mark.parametrize("quarters, way", [(1, "right"), (3, "left")])
-def test_a_person_who_lies_on_either_side_stands_in_the_frames_and_the_user_is_told(tmp_path, red_heads, quarters, way):
+@pytest.mark.parametrize("quarters, way", [(1, "a quarter to the right"), (2, "a half"), (3, "a quarter to the left")])
+def test_who_lies_on_either_side_or_is_upside_down_stands_in_the_frames_and_the_user_is_told(tmp_path, red_heads, quarters, way):
     frames, (told,) = split(make_clip(tmp_path / "a/clip.mkv", quarters), tmp_path / "out")
-    assert f"turned by a quarter to the {way}" in told.message
+    assert f"turned by {way}." in told.message and told.figure == 4 - quarters
     for t, frame in enumerate(frames):
         np.testing.assert_allclose(frame.astype(int), person(t), atol=3)
 
 
-@pytest.mark.parametrize("quarters", [0, 2])
-def test_who_stands_or_is_upside_down_stays_so(tmp_path, red_heads, monkeypatch, quarters):
-    clip = make_clip(tmp_path / "a/clip.mkv", quarters)
+def test_who_stands_stays_so(tmp_path, red_heads, monkeypatch):
+    clip = make_clip(tmp_path / "a/clip.mkv", 0)
     frames, told = split(clip, tmp_path / "out")
     monkeypatch.setattr(stage, "NETWORKS", ("absent",))  # nobody is looked for
     same, _ = split(clip, tmp_path / "same")
@@ -121,14 +120,15 @@ def test_large_footage_is_cut_about_the_person_after_it_was_turned(tmp_path, red
     assert head[:, 0].max() <= trunk[:, 0].min() + 1 and np.ptp(trunk[:, 0]) > 1.2 * 70 * 128 / 328
 
 
-def test_masks_and_plate_follow(tmp_path, red_heads):
-    folder = make_clip(tmp_path / "a/clip.mkv", 1).parent
+@pytest.mark.parametrize("quarters", [1, 2])
+def test_masks_and_plate_follow(tmp_path, red_heads, quarters):
+    folder = make_clip(tmp_path / "a/clip.mkv", quarters).parent
     (folder / "masks").mkdir()
     for t in range(FRAMES):
-        Image.fromarray(np.rot90(mask(t))).save(folder / f"masks/{t:06d}.png")
+        Image.fromarray(np.rot90(mask(t), quarters)).save(folder / f"masks/{t:06d}.png")
     room = person()
     room[20:110, 24:44] = 70
-    Image.fromarray(np.rot90(room)).save(folder / "plate.png")
+    Image.fromarray(np.rot90(room, quarters)).save(folder / "plate.png")
     split(folder, tmp_path / "out")
     frames = tmp_path / "out/frames"
     np.testing.assert_allclose(read_frame(frames / "plate.png").astype(int), room, atol=2)
@@ -136,23 +136,32 @@ def test_masks_and_plate_follow(tmp_path, red_heads):
         np.testing.assert_allclose(read_alpha(path), mask(t) / 255, atol=0.01)
 
 
-def test_photos_are_turned_with_their_masks_and_plate(tmp_path, red_heads):
+@pytest.mark.parametrize("quarters, way", [(2, "a half"), (3, "to the left")])
+def test_photos_are_turned_with_their_masks_and_plate(tmp_path, red_heads, quarters, way):
     folder = tmp_path / "photos"
     (folder / "masks").mkdir(parents=True)
     for t in range(FRAMES):
-        Image.fromarray(np.rot90(person(t), 3)).save(folder / f"IMG_{t}.png")
-        Image.fromarray(np.rot90(mask(t), 3)).save(folder / f"masks/IMG_{t}.png")
-    Image.fromarray(np.rot90(person(), 3)).save(folder / "plate.png")
+        Image.fromarray(np.rot90(person(t), quarters)).save(folder / f"IMG_{t}.png")
+        Image.fromarray(np.rot90(mask(t), quarters)).save(folder / f"masks/IMG_{t}.png")
+    Image.fromarray(np.rot90(person(), quarters)).save(folder / "plate.png")
     frames, (told,) = split(folder, tmp_path / "out")
-    assert "to the left" in told.message and np.array_equal(frames, [person(t) for t in range(FRAMES)])
+    assert way in told.message and np.array_equal(frames, [person(t) for t in range(FRAMES)])
     assert np.array_equal(read_frame(tmp_path / "out/frames/plate.png"), person())
     for t, path in enumerate(frame_paths(tmp_path / "out/frames/masks")):
         np.testing.assert_allclose(read_alpha(path), mask(t) / 255, atol=0.01)
 
 
+def test_a_photo_that_lies_on_its_side_among_others_is_named(tmp_path, red_heads):
+    (tmp_path / "photos").mkdir()
+    for t in range(FRAMES):
+        Image.fromarray(np.rot90(person(t), t == 2)).save(tmp_path / f"photos/IMG_{t}.png")
+    frames, (told,) = split(tmp_path / "photos", tmp_path / "out")
+    assert told.code is Code.LIES_ON_SIDE and told.frames == [[2, 2]] and np.array_equal(frames[3], person(3))
+
+
 def test_who_lies_down_in_some_of_the_pictures_is_not_turned_and_who_stands_in_the_first_one_costs_one_look():
     people, looked = RedHeads({}), []
-    stands, left, right = person(), np.rot90(person()), np.rot90(person(), 3)
+    stands, left, over, right = (np.rot90(person(), quarters) for quarters in range(4))
     nobody = np.zeros_like(stands)
 
     def watched(*pictures):
@@ -165,6 +174,8 @@ def test_who_lies_down_in_some_of_the_pictures_is_not_turned_and_who_stands_in_t
     assert find_quarters(people, watched(left, right, left, right)) == 0
     assert find_quarters(people, watched(left, left, nobody, left, stands)) == 3
     assert find_quarters(people, watched(nobody, right, right)) == 1
+    assert find_quarters(people, watched(over, stands, over, stands)) == find_quarters(people, watched(over, left)) == 0
+    assert find_quarters(people, watched(over, nobody, over, stands)) == 2
     assert find_quarters(people, watched(nobody, nobody)) == find_quarters(people, watched()) == 0
     assert find_quarters(people, watched(stands, left, left, left)) == 0 and len(looked) == 1
 
@@ -177,11 +188,12 @@ def test_an_empty_room_that_the_network_takes_for_somebody_who_lies_turns_nothin
 
     people, empty = SomebodyEverywhere({}), np.zeros_like(person())
     assert find_quarters(people, [empty] * 5) == find_quarters(people, [empty, empty, empty, person(), empty]) == 0
+    assert find_quarters(people, [np.rot90(empty)] * 5) == 0, "somebody who hangs head down however the room is turned"
     assert find_quarters(people, [np.rot90(person()), np.rot90(empty), np.rot90(empty)]) == 3
 
 
-@pytest.mark.parametrize("quarters", [0, 1, 3])
-def test_the_networks_see_on_which_side_a_person_lies(quarters):
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+def test_the_networks_see_which_way_a_person_is_turned(quarters):
     root = Path(os.environ.get("GSAC_CACHE", "~/.cache/gsac")).expanduser()
     try:
         people = People({name: model_path(name, root) for name in NETWORKS})

@@ -40,5 +40,12 @@ def test_who_stands_still_or_is_seen_to_sway_to_all_sides_is_trusted(across, alo
     assert find_unseen_sway(turned(350), person(across, along)) == []
 
 
+def test_a_frame_that_lies_on_its_side_says_nothing_of_the_others():
+    joints = person(0.02, 0.01)
+    joints[7, INDEX["pelvis"]] = joints[7, INDEX["left_ankle"]] + [-0.84, -0.04, 0]
+    assert measure_missing_sway(joints) == pytest.approx(measure_missing_sway(person(0.02, 0.01)), abs=2e-3)
+    assert find_unseen_sway(turned(350), joints) == []
+
+
 def test_nothing_is_concluded_of_who_does_not_turn():
     assert find_unseen_sway(turned(120), person(0.10, 0.02)) == []
