@@ -54,7 +54,7 @@ class Code(Enum):
     HAND_NEVER_DETECTED = Wording("The {side} hand was never seen; its fingers stay at rest.", "Show both hands, fingers apart.")
     FACE_NEVER_DETECTED = Wording("The face was never seen from the front; it stays without expression.",
                                   "Look into the camera for a second.")
-    HAND_NEVER_SEEN = Wording("The {side} hand is never seen; its pose will be a guess.",
+    HAND_NEVER_SEEN = Wording("The {side} hand was never seen well enough; its pose is a guess.",
                               "Show both hands, fingers apart.")
     HAND_MISPLACED = Wording("The {side} hand was detected in a wrong place in {frames}; those detections are not used.")
     HAND_NOT_FILLED = Wording("The {side} hand is missing in {frames}, too long to fill.", "Keep the hands in sight.")
@@ -62,7 +62,7 @@ class Code(Enum):
                              "points.", Severity.WRONG)
     MASK_MISSING = Wording("The mask of {frames} is missing; the body is fitted to the points alone there.",
                            "Run segment again, or bring all masks.", Severity.WRONG)
-    EMPTY_MASK = Wording("No person is in {frames}; the mask there is empty.")
+    EMPTY_MASK = Wording("The mask of {frames} is empty although a person was found there.")
     OTHER_SCENE = Wording("The plate does not show the scene of {frames} (did the camera move?); it is not used there.")
     CAMERA_MOVES = Wording("The camera moves by up to {figure:.0f} px, in {frames}.",
                            "Stand the phone on something firm, and do not zoom.", Severity.WRONG)

@@ -10,7 +10,7 @@ import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
 from gsac.avatar.facemesh import POINTS
 from gsac.avatar.threads import available_cores
-from gsac.avatar.wholebody import INDEX
+from gsac.avatar.wholebody import FACE, INDEX
 from gsac.stages.contract import Job
 from gsac.stages.face.actions import Actions, fill_unseen, smooth, smoothing_sigma, solve
 from gsac.stages.face.config import ENCODER
@@ -46,7 +46,8 @@ def run(job: Job) -> None:
             c = smooth(c, seen, smoothing_sigma(actions.names, config.smooth_lids, config.smooth, config.smooth_slow, apart))
     else:
         c, own = np.zeros((0, len(actions.names))), np.zeros((POINTS, 3))
-        job.warn(Finding.of(Code.FACE_AT_REST))
+        if keypoints["score"][:, FACE].any():  # else keypoints has said so
+            job.warn(Finding.of(Code.FACE_AT_REST))
     expression = fill_unseen(c, valid, times, config.rest_time)
     seen_only = {}
     if valid.any():

@@ -48,19 +48,20 @@ def run(job: Job) -> None:
     sigma = np.where(filled, np.hypot(full, drift), detection_sigma(score, person_height(xy, score)))
     score = np.where(filled, FILLED_SCORE * full / sigma, score)
     world = np.where(unseen[..., None], np.nan, keypoints["world"])
-    _report(job, found, filled, own)
+    _report(job, found, filled, own, keypoints["score"])
     write_arrays(job.out / "keypoints.npz", xy=xy.astype(np.float32), score=score.astype(np.float32),
                  world=world.astype(np.float32), detector=keypoints["detector"], missing=found.hand, filled=filled,
                  sigma=sigma.astype(np.float32))
 
 
-def _report(job: Job, found: MissingHands, filled: np.ndarray, own: np.ndarray) -> None:
-    """Warns of what the user should know: hands never seen, taken for the other one, or left missing. own: (T,) bool, frames that
-    repeat no other."""
+def _report(job: Job, found: MissingHands, filled: np.ndarray, own: np.ndarray, detected: np.ndarray) -> None:
+    """Warns of what the user should know: hands never seen well, taken for the other one, or left missing; of those that were never
+    detected `keypoints` has told. own: (T,) bool, frames that repeat no other; detected: (T, 133) the detector's scores."""
     for i, side in enumerate(SIDES):
         missing = found.hand[:, i]
         if missing.all():
-            job.warn(Finding.of(Code.HAND_NEVER_SEEN, figure=len(missing), side=side))
+            if detected[:, HANDS[side]].any():
+                job.warn(Finding.of(Code.HAND_NEVER_SEEN, figure=len(missing), side=side))
             continue
         if found.misplaced[:, i].any():
             job.warn(Finding.of(Code.HAND_MISPLACED, found.misplaced[:, i], side=side))

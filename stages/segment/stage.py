@@ -70,7 +70,7 @@ def run(job: Job) -> None:
     clip = Clip.read(job.inputs["split/clip.json"])
     (job.out / "alpha").mkdir()
     if job.config.method == "brought":
-        sway = use_brought(job, paths)
+        sway = use_brought(job, paths, keypoints)
     else:
         if (frames / MASKS).is_dir():
             job.note("Masks lie beside the footage and are not used; segment.method=brought takes them.")
@@ -83,15 +83,25 @@ def run(job: Job) -> None:
         job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
 
 
-def use_brought(job: Job, paths: list[Path]) -> np.ndarray:
-    """Hands on the masks that came with the footage. paths: T frames. Returns (T,) px, how far the camera sways."""
+def use_brought(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray]) -> np.ndarray:
+    """Hands on the masks that came with the footage. paths: T frames; keypoints: their arrays (T, ...) by name. Returns (T,) px,
+    how far the camera sways."""
     empty = np.zeros(len(paths), bool)
     sway = measure_sway(count_views(job, hand_on(paths, job.out / "alpha", empty), len(paths)))
     if empty.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: the mask that came with it shows nobody there")
-    if empty.any():
-        job.warn(Finding.of(Code.EMPTY_MASK, empty))
+    warn_of_empty(job, empty, keypoints["score"])
     return sway
+
+
+def warn_of_empty(job: Job, empty: np.ndarray, score: np.ndarray) -> None:
+    """Names the frames whose mask is empty though they have points; of those without a person `keypoints` has told.
+
+    empty: (T,) bool, those masks; score: (T, 133) of the points.
+    """
+    unfound = empty & score.any(1)
+    if unfound.any():
+        job.warn(Finding.of(Code.EMPTY_MASK, unfound))
 
 
 def count_views(job: Job, views: Iterable[View], total: int) -> Iterator[View]:
@@ -171,8 +181,7 @@ def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], cl
                 plate is not None and fits[~absent].mean() >= MOSTLY)
             plate = relearn_plate(paths, ~absent, outline) if still else None
         deque(pool.map(soft, range(len(paths))), maxlen=0)
-    if absent.any():
-        job.warn(Finding.of(Code.EMPTY_MASK, absent))
+    warn_of_empty(job, absent, keypoints["score"])
     other_scene = ~fits & ~absent
     if given and other_scene.any():
         job.warn(Finding.of(Code.OTHER_SCENE, other_scene))

@@ -90,9 +90,9 @@ def run(job: Job) -> None:
     usable[empty] = False
     if empty:
         job.warn(Finding.of(Code.MASK_NOT_TRAINED, ~usable))
-    usable &= ~params.lost
-    if (failed := params.lost & clip.shows_own_moment(count)).any():
+    if (failed := usable & params.lost & clip.shows_own_moment(count)).any():
         job.warn(Finding.of(Code.POSE_NOT_TRAINED, failed))
+    usable &= ~params.lost
     if not usable.any():
         raise StageError("smplx/body.npz: no frame with a mask has a fitted body; look at the warnings of smplx")
     held = (hold_out(params.global_orient, usable, config.holdout) if config.heldout_frames is None

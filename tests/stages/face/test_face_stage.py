@@ -7,6 +7,7 @@ import pytest
 from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, read_arrays, write_arrays
 from gsac.avatar.body import Body
 from gsac.avatar.network_files import ModelMissingError, model_path
+from gsac.avatar.wholebody import FACE
 from gsac.benchmarks.perception import run_face, run_keypoints, score_expression, video_frames, write_split
 from gsac.stages.contract import Job, StageError
 from gsac.stages.face import STAGE
@@ -15,6 +16,7 @@ from gsac.stages.face.stage import run
 from support.artifacts import blank
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
+AT_REST = "The face was never seen from the front; the avatar's face stays at rest."
 
 
 @pytest.fixture(scope="module")
@@ -34,21 +36,24 @@ def need(path: Path) -> Path:
     return path
 
 
-def unseen(folder: Path, frames: int, said: int) -> dict[str, Path]:
-    """Ports of a clip of grey frames whose keypoints, of `said` frames, saw no face."""
+def unseen(folder: Path, frames: int, said: int, score: float = 0.0) -> dict[str, Path]:
+    """Ports of a clip of grey frames whose keypoints, of `said` frames, saw no face from the front; score: of its points."""
     ports = write_split(iter([np.full((64, 48, 3), 120, np.uint8)] * frames), folder / "split")
     ports["keypoints/keypoints.npz"] = folder / "keypoints.npz"
+    scores = np.zeros((said, 133), np.float32)
+    scores[:, FACE] = score
     write_arrays(folder / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=said) | {
-        "world": np.full((said, 133, 3), np.nan), "face_mesh": np.full((said, 468, 3), np.nan)})
+        "score": scores, "world": np.full((said, 133, 3), np.nan), "face_mesh": np.full((said, 468, 3), np.nan)})
     return ports
 
 
-def test_a_face_that_is_never_seen_rests_with_a_warning(tmp_path, store):
-    face, notes = run_face(unseen(tmp_path, 3, 3), tmp_path, store)
+@pytest.mark.parametrize(("score", "said"), [(0.0, []), (0.5, [AT_REST])])
+def test_a_face_that_is_never_seen_rests_and_is_named_where_keypoints_has_not_said_so(tmp_path, store, score, said):
+    face, notes = run_face(unseen(tmp_path, 3, 3, score), tmp_path, store)
     assert not face["valid"].any() and face["expression"].shape == (3, 52) and not face["expression"].any()
     assert np.isnan(face["landmarks"]).all() and not face["shape"].any()
     assert not {"head_vertices", "rest_expression"} & face.keys()
-    assert notes["warnings"] == ["The face was never seen from the front; the avatar's face stays at rest."]
+    assert notes["warnings"] == said
 
 
 def test_keypoints_of_another_clip_are_refused(tmp_path, store):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.wholebody import ARM
+from gsac.avatar.wholebody import ARM, HANDS
 
 LEFT, RIGHT = 0, 1
 
@@ -90,11 +90,19 @@ def test_a_score_between_the_two_thresholds_neither_loses_nor_returns_a_hand(syn
     assert np.flatnonzero(out["missing"][:, LEFT]).tolist() == list(range(60, 75))
 
 
-def test_hands_never_seen_give_a_warning_and_no_points(synthetic, tmp_path):
+def test_hands_never_detected_give_no_points_and_no_second_warning(synthetic, tmp_path):
     person = synthetic.lose(synthetic.turning(), "left", 0, 100)
     out, warnings = synthetic.through_stage(person, tmp_path)
     assert out["missing"][:, LEFT].all() and not out["filled"].any() and (out["score"][:, 91:112] == 0).all()
-    assert "never seen" in warnings[0]
+    assert not warnings, "keypoints has said so"
+
+
+def test_a_hand_whose_every_detection_is_too_weak_gives_a_warning(synthetic, tmp_path):
+    person = synthetic.turning()
+    person.score[:, HANDS["left"]] = 0.1
+    out, warnings = synthetic.through_stage(person, tmp_path)
+    assert out["missing"][:, LEFT].all()
+    assert warnings[0] == "The left hand was never seen well enough; its pose is a guess. Show both hands, fingers apart."
 
 
 def test_points_that_are_not_numbers_count_as_unseen(synthetic, tmp_path):

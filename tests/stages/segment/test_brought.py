@@ -58,11 +58,13 @@ def test_truth_masks_of_a_turning_person_come_out_as_the_alpha(made, tmp_path, s
         assert ((wanted > 0.1) & (wanted < 0.9)).sum() / (wanted > 0.5).sum() > 0.02  # edges were soft, and stay so
 
 
-def test_a_frame_whose_mask_shows_nobody_is_named(spoilt, made, tmp_path):
+def test_a_frame_with_a_person_whose_mask_shows_nobody_is_named(spoilt, made, tmp_path):
+    write_arrays(tmp_path / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=4) | {"score": np.ones((4, 133), np.float32)})
     empty = np.zeros_like(read_alpha(spoilt / "frames/masks/000002.exr"))
     write_alpha(spoilt / "frames/masks/000002.exr", empty)
-    alphas, warnings = cut(spoilt, made, tmp_path / "out")
-    assert not alphas[2].any() and warnings == ["No person is in frame 2; the mask there is empty."]
+    alphas, warnings = cut(spoilt, tmp_path, tmp_path / "out")
+    assert not alphas[2].any() and warnings == ["The mask of frame 2 is empty although a person was found there."]
+    assert cut(spoilt, made, tmp_path / "without points")[1] == [], "keypoints has said so"
     for t in range(4):
         write_alpha(spoilt / f"frames/masks/{t:06d}.exr", empty)
     with pytest.raises(StageError, match=r"frame 0 \(000000.png\) and all others: .* shows nobody"):

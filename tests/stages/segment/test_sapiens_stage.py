@@ -51,7 +51,7 @@ def test_a_frame_without_a_person_has_empty_labels_too(network, tmp_path):
     image = paint(((60, 50, 200, 400), (160, 20, 20)))
     alphas, labels, warnings = run(tmp_path, [image, paint()], [(80, 80), (180, 80), (120, 300), (130, 350)], network)
     assert alphas[0].any() and labels[0].any() and not alphas[1].any() and not labels[1].any()
-    assert warnings == ["No person is in frame 1; the mask there is empty."]
+    assert warnings == ["The mask of frame 1 is empty although a person was found there."]
 
 
 def test_of_two_persons_the_one_with_the_points_is_kept_to_the_edge(network, tmp_path):
