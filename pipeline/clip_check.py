@@ -93,9 +93,16 @@ def check_clip(clip: Path, keypoints: Path, findings: list[tuple[str, dict[str, 
     """The check by outputs of split and keypoints, and by what the stages up to LAST found: sentences with their entries."""
     times, look = Clip.read(clip).timestamps_s, FirstLook.of(check_keypoints(keypoints))
     sparse = times is not None and len(times) > 1 and (times[-1] - times[0]) / (len(times) - 1) > SPARSE_S
-    found = [pair for pair in findings if not (sparse and pair[1]["code"] in BY_NEIGHBOURS)]
+    empty = set().union(*(list_frames(entry) for _, entry in findings if entry["code"] == Code.NO_PERSON.word))
+    found = [(message, entry) for message, entry in findings if not (
+        sparse and entry["code"] in BY_NEIGHBOURS or entry["code"] == Code.NOT_FITTED.word and list_frames(entry) <= empty)]
     turn = look.turn if times is None else look.turn * look.frames / max(look.frames - 1, 1)  # a video shows what lies between, too
     if look.frames > 1 and turn < LEAST_TURN:
         part = Finding.of(Code.PART_OF_TURN, figure=turn)
         found.append((part.message, part.to_json()))
     return ClipCheck(look, times, found)
+
+
+def list_frames(entry: dict[str, Any]) -> set[int]:
+    """Those that an entry of `--json` names."""
+    return {t for first, last in entry["frames"] for t in range(first, last + 1)}

@@ -22,9 +22,7 @@ BODY = slice(0, 17)
 """Of the points, COCO's, with the wrists but not the hands."""
 SURE, LEAST = 0.2, 4
 """Score of a body point that counts, and how many show a person."""
-REPEATED, NOBODY = "the picture is an earlier frame's", "no person is seen"
-TOLD = (REPEATED, NOBODY)
-"""Reasons that split and keypoints have named."""
+REPEATED = "the picture is an earlier frame's"
 FAR = 0.05
 """Median reprojection error of a lost frame, as a share of the person's height; a good fit has a tenth of it."""
 
@@ -38,18 +36,17 @@ def find_seen(score: np.ndarray, filled: np.ndarray) -> np.ndarray:
     return (found.sum(1) >= LEAST) & (found & ~filled[:, BODY].astype(bool)).any(1)
 
 
-def find_lost_frames(fit: Fit, seen: np.ndarray, height: float, own: np.ndarray, detected: np.ndarray) -> dict[str, np.ndarray]:
+def find_lost_frames(fit: Fit, seen: np.ndarray, height: float, own: np.ndarray) -> dict[str, np.ndarray]:
     """Reason -> frames (T,) bool; a frame has at most one reason.
 
-    seen: (T,) bool, frames with a person; height: px, of the person; own: (T,) bool, frames that repeat no other; detected: (T,)
-    bool, frames with any point that is not filled.
+    seen: (T,) bool, frames with a person; height: px, of the person; own: (T,) bool, frames that repeat no other.
     """
     iou, off = np.nan_to_num(fit.iou, nan=1.0), np.nan_to_num(fit.reprojection, nan=0.0)
     seen = seen & own
     usual = np.median(iou[seen]) if seen.any() else 1.0
     uncovered = seen & (iou < min(POOR_IOU, usual - FALL))
     away = seen & ~uncovered & (off > FAR * height)
-    return {REPEATED: ~own, NOBODY: own & ~seen & ~detected, "hardly a point of the person is seen": own & ~seen & detected,
+    return {REPEATED: ~own, "no person is seen": own & ~seen,
             f"the body covers the silhouette badly (IoU below {POOR_IOU})": uncovered,
             f"the body lies more than {FAR:.0%} of its height off the seen points": away}
 
@@ -66,7 +63,7 @@ def describe_lost_frames(lost: dict[str, np.ndarray], fit: Fit) -> list[Finding]
     lost: reason -> frames (T,) bool.
     """
     out = [Finding.of(Code.NOT_FITTED, mask, reason=reason) for reason, mask in lost.items()
-           if mask.any() and reason not in TOLD]
+           if mask.any() and reason != REPEATED]  # `split` has said so
     kept = ~np.any(list(lost.values()), axis=0)
     low = kept & (np.nan_to_num(fit.iou, nan=1.0) < LOOSE_IOU)
     beside = kept & (fit.uncovered > BESIDE if fit.uncovered is not None else False)

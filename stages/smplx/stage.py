@@ -90,8 +90,7 @@ def run(job: Job) -> None:
     params.occluder = occluder
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
-    detected = np.any((points["score"] > 0) & ~points["filled"].astype(bool), 1)
-    lost = find_lost_frames(fit, seen, sightings.person_height, own, detected)
+    lost = find_lost_frames(fit, seen, sightings.person_height, own)
     fitted = ~np.any(list(lost.values()), axis=0)
     params.sigma_joints[~fitted] = LOST
     for finding in (*fit.notes, *describe_arms(fit.arms, fitted), *hidden, *describe_lost_frames(lost, fit)):

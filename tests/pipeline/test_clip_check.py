@@ -49,6 +49,17 @@ def test_hands_are_not_blamed_by_neighbours_that_lie_far_apart(tmp_path, monkeyp
     assert [entry["code"] for _, entry in found] == said
 
 
+def test_of_frames_that_show_nobody_it_is_said_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(FirstLook, "of", lambda points: LOOK)
+    monkeypatch.setattr(clip_check, "check_keypoints", lambda path: {})
+    Clip(30.0, [0.2 * t for t in range(4)], 90, 160, None, "0" * 64).write(tmp_path / "clip.json")
+    empty, more = np.array([1, 1, 0, 0], bool), np.array([1, 1, 1, 0], bool)
+    told = [Finding.of(Code.NO_PERSON, empty), Finding.of(Code.NOT_FITTED, empty, reason="no person is seen"),
+            Finding.of(Code.NOT_FITTED, more, reason="no person is seen")]
+    found = clip_check.check_clip(tmp_path / "clip.json", tmp_path, [(each.message, each.to_json()) for each in told]).findings
+    assert [(entry["code"], entry["frames"]) for _, entry in found] == [("no_person", [[0, 1]]), ("not_fitted", [[0, 2]])]
+
+
 @pytest.mark.parametrize(("photos", "said"), [(2, ["part_of_turn"]), (3, ["part_of_turn"]), (4, ["part_of_turn"]), (7, [])])
 def test_between_photos_nothing_is_seen_and_between_the_frames_of_a_video_the_turn_goes_on(tmp_path, monkeypatch, photos, said):
     monkeypatch.setattr(FirstLook, "of", lambda points: replace(LOOK, frames=photos, seen=photos, turn=360 * (1 - 1 / photos) - 1))
