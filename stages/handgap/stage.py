@@ -18,6 +18,8 @@ from gsac.stages.turn_pace import pace
 
 RULES = {"places": find_missing, "paper": find_missing_as_paper}
 """handgap.rule -> the function that finds missing hands."""
+MOSTLY = 0.5
+"""Share of the photos that may lack a hand."""
 FILLED_SCORE = 0.5
 """Score of a filled point whose sigma is a detection's; it falls as sigma grows."""
 
@@ -48,15 +50,17 @@ def run(job: Job) -> None:
     sigma = np.where(filled, np.hypot(full, drift), detection_sigma(score, person_height(xy, score)))
     score = np.where(filled, FILLED_SCORE * full / sigma, score)
     world = np.where(unseen[..., None], np.nan, keypoints["world"])
-    _report(job, found, filled, own, keypoints["score"])
+    _report(job, found, filled, own, keypoints["score"], times is None)
     write_arrays(job.out / "keypoints.npz", xy=xy.astype(np.float32), score=score.astype(np.float32),
                  world=world.astype(np.float32), detector=keypoints["detector"], missing=found.hand, filled=filled,
                  sigma=sigma.astype(np.float32))
 
 
-def _report(job: Job, found: MissingHands, filled: np.ndarray, own: np.ndarray, detected: np.ndarray) -> None:
+def _report(job: Job, found: MissingHands, filled: np.ndarray, own: np.ndarray, detected: np.ndarray,
+            photos: bool) -> None:
     """Warns of what the user should know: hands never seen well, taken for the other one, or left missing; of those that were never
-    detected `keypoints` has told. own: (T,) bool, frames that repeat no other; detected: (T, 133) the detector's scores."""
+    detected `keypoints` has told. own: (T,) bool, frames that repeat no other; detected: (T, 133) the detector's scores; photos:
+    nothing is filled, and a body hides each hand in some."""
     for i, side in enumerate(SIDES):
         missing = found.hand[:, i]
         if missing.all():
@@ -65,6 +69,8 @@ def _report(job: Job, found: MissingHands, filled: np.ndarray, own: np.ndarray, 
             continue
         if found.misplaced[:, i].any():
             job.warn(Finding.of(Code.HAND_MISPLACED, found.misplaced[:, i], side=side))
+        if photos and missing.mean() <= MOSTLY:
+            continue
         left = missing & own & ~filled[:, HANDS[side]].all(axis=1)
         for start, end in runs(left):
             if end - start == 1:

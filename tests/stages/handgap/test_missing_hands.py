@@ -136,3 +136,10 @@ def test_the_papers_rule_goes_by_the_scores_of_wrist_and_palm_and_fills_the_elbo
     assert np.flatnonzero(out["missing"][:, LEFT]).tolist() == [20, 21, 22, 23], "its wrist is seen from 40 on: not missing"
     assert not out["missing"][:, RIGHT].any(), "a wrong place with a good score is believed"
     assert out["filled"][20:24, ARM["left"][1]].all(), "the elbow, which was seen, is placed anew"
+
+
+@pytest.mark.parametrize(("lost", "said"), [(3, 0), (7, 1)])
+def test_a_hand_that_few_photos_lack_is_no_news(synthetic, tmp_path, lost, said):
+    person = synthetic.lose(synthetic.turning(frames=10), "left", 1, 1 + lost)
+    _, warnings = synthetic.through_stage(person, tmp_path, photos=True)
+    assert len(warnings) == said
