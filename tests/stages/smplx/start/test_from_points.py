@@ -72,8 +72,6 @@ def to_rig(points: np.ndarray) -> np.ndarray:
 def inputs(tmp_path_factory, body: Body):
     """The turning person; red and green of a frame are cosine and sine of the turn, from -1..1 to 0..255."""
     made = write_inputs(body, tmp_path_factory.mktemp("inputs"))
-    made["split/frames"] = made["split/clip.json"].parent / "frames"
-    made["split/frames"].mkdir()
     for t in range(FRAMES):
         colour = np.rint([127.5 * (np.cos(t * TURN) + 1), 127.5 * (np.sin(t * TURN) + 1), 0])
         write_frame(made["split/frames"] / f"{t:06d}.png", np.full((HEIGHT, WIDTH, 3), colour, np.uint8))
