@@ -94,10 +94,9 @@ def measure_sway(views: Iterable[View]) -> np.ndarray:
 def find_home(places: np.ndarray, near: float) -> np.ndarray:
     """places: (T, 4, 2) px or NaN; near: px. Returns (4, 2), the place with most others near it where those are many, else the
     median."""
-    apart = np.linalg.norm(places[:, None] - places, axis=3).mean(2)
-    count = (apart <= near).sum(1)
-    most = int(count.argmax())
-    return places[most] if count[most] >= STAYS * np.isfinite(apart.diagonal()).sum() else np.nanmedian(places, axis=0)
+    count = [(np.linalg.norm(places - place, axis=2).mean(1) <= near).sum() for place in places]
+    most, known = int(np.argmax(count)), np.isfinite(places[:, 0, 0]).sum()
+    return places[most] if count[most] >= STAYS * known else np.nanmedian(places, axis=0)
 
 
 def find_moved(sway: np.ndarray, longer: int) -> np.ndarray:
@@ -123,10 +122,13 @@ def follow(before: View, after: View) -> Pairs:
 
 def find_again(before: View, after: View) -> Pairs:
     """Points of the background that are found by what they look like, each the other's best, wherever and however large."""
+    nothing = np.zeros((0, 2), np.float32)
+    if min(len(find_corners(view)) for view in (before, after)) < LEAST_POINTS:  # a plain wall: the search takes 40 ms
+        return nothing, nothing
     sift, matcher = cv2.SIFT.create(contrastThreshold=FAINT), cv2.BFMatcher()
     (start, first), (end, second) = (sift.detectAndCompute(view.grey, view.free.astype(np.uint8)) for view in (before, after))
     if min(len(start), len(end)) < LEAST_POINTS:
-        return np.zeros((0, 2), np.float32), np.zeros((0, 2), np.float32)
+        return nothing, nothing
     back = [match.trainIdx for match in matcher.match(second, first)]
     found = [best for best, other in matcher.knnMatch(first, second, k=2)
              if best.distance < DISTINCT * other.distance and back[best.trainIdx] == best.queryIdx]
