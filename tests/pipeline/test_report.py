@@ -289,6 +289,17 @@ def test_a_frame_without_a_mask_costs_its_own_picture_and_is_named(copied):
     assert "segment/alpha has no mask for any frame." in page_of(copied).text("alpha")
 
 
+def test_a_torn_mask_costs_its_own_picture_and_is_named(copied):
+    masks = sorted((copied / "segment/alpha").iterdir())
+    masks[2].write_bytes(masks[2].read_bytes()[:11])
+    page = page_of(copied)
+    assert len(page.images("alpha")) == T - 1 and "Mask cannot be read, and not shown frame 2" in page.text("alpha")
+    assert len(page.images("body")) == T
+    for mask in masks:
+        mask.write_bytes(b"torn")
+    assert "No mask of segment/alpha can be read." in page_of(copied).text("alpha")
+
+
 def test_the_worst_held_out_frame_is_named(whole):
     page = Page(whole / "report.html")
     assert "frame 4, 21.25 dB on the person (the worst frame)" in page.text("heldout")
