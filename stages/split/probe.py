@@ -13,6 +13,7 @@ from av.container import InputContainer
 
 from gsac.stages.contract import BadInput
 from gsac.stages.split.pick import turn_size
+from gsac.stages.split.picture_file import refuse_picture
 
 HLG, PQ, BT2020_PRIMARIES, BT2020_MATRIX, UNSPECIFIED = 18, 16, 9, 9, 2
 """Code points of ITU-T H.273."""
@@ -63,7 +64,8 @@ class Video:
 
 
 def probe(path: Path) -> Video:
-    """Raises BadInput where no picture of the file can be decoded."""
+    """Raises BadInput where the file is a picture, or no picture of it can be decoded."""
+    refuse_picture(path)
     try:
         with open_video(path) as container:
             return _probe(container, path)

@@ -9,7 +9,9 @@ import av
 import cv2
 import imageio_ffmpeg
 import numpy as np
+import pillow_heif
 import pytest
+from PIL import Image
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.stages.contract import BadInput, Job
@@ -167,6 +169,14 @@ def test_what_is_not_a_video_is_bad_input(tmp_path, content):
     source.write_bytes(content)
     with pytest.raises(BadInput, match="notes.mp4"):
         split(source, tmp_path / "out")
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP", "BMP", "TIFF", "HEIF"])
+def test_a_photo_under_a_videos_name_is_said_to_be_a_picture(tmp_path, kind):
+    pillow_heif.register_heif_opener()
+    Image.new("RGB", (90, 160)).save(tmp_path / "clip.mp4", format=kind)
+    with pytest.raises(BadInput, match=r"clip.mp4: is a picture \(.*\) under a video's name. Give .* name it clip\.\w+"):
+        split(tmp_path / "clip.mp4", tmp_path / "out")
 
 
 PLAYLISTS = {
