@@ -50,7 +50,7 @@ class Code(Enum):
     SECOND_PERSON = Wording("A second person was seen in {frames}; only the first one is followed.",
                             "Keep others out of the picture or cut these frames.")
     CUT_OFF = Wording("The edge of the picture cuts off {parts}; what lies outside is guessed.",
-                      "Stand in the middle, far enough away that head, hands and feet stay in the picture.")
+                      "Stand in the middle, and farther away if head, hands and feet do not fit into the picture.")
     HAND_NEVER_DETECTED = Wording("The {side} hand was never seen; its fingers stay at rest.", "Show both hands, fingers apart.")
     FACE_NEVER_DETECTED = Wording("The face was never seen from the front; it stays without expression.",
                                   "Look into the camera for a second.")
