@@ -104,8 +104,8 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
 
 
 def judge_size(job: Job, points: dict[str, np.ndarray], cuts: list[set[Cut]]) -> None:
-    """Tells what was seen, and warns of a person who is too small for detail, but for one who mostly is cut off above or below: what
-    shows of that one tells no height, and to come closer would cut off more.
+    """Tells what was seen, and warns of a person who is too small for detail; not of one who mostly is cut off above or below: what
+    shows tells no height, and to come closer would cut off more.
 
     points: arrays of keypoints.npz, (T, ...); cuts: one for each frame.
     """
