@@ -1,4 +1,4 @@
-"""Tells a picture that bears a video's name, by its first bytes: ffmpeg calls it invalid data, and of a HEIC photo it takes a tile."""
+"""Tells a picture that bears a video's name, by its first bytes: to ffmpeg it is invalid data, or one tile of a HEIC photo."""
 
 from __future__ import annotations
 
