@@ -48,6 +48,8 @@ class Video:
     primaries: int
     matrix: int
     has_alpha: bool
+    interlaced: bool
+    """Whether its frames are two half pictures each, as camcorders film."""
     decoder: str | None
     """The ffmpeg decoder to use where its default would lose the alpha channel."""
     rate: float | None
@@ -128,6 +130,7 @@ def _probe(container: InputContainer, path: Path) -> Video:
         declared_frames=stream.frames, width=width, height=height,
         transfer=int(picture.color_trc), primaries=int(picture.color_primaries), matrix=int(picture.colorspace),
         has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
+        interlaced=picture.interlaced_frame,
         decoder={"vp8": "libvpx", "vp9": "libvpx-vp9"}[codec] if hidden_alpha else None,
         rate=float(rate) if rate else None, tags=tags)
 
