@@ -62,6 +62,9 @@ class Code(Enum):
                              "points.", Severity.WRONG)
     MASK_MISSING = Wording("The mask of {frames} is missing; the body is fitted to the points alone there.",
                            "Run segment again, or bring all masks.", Severity.WRONG)
+    MASK_BESIDE = Wording("The mask of {frames} lies beside the person, as the points show them.",
+                          "Masks that you bring are white where the person is and black elsewhere, each one its own frame's: look "
+                          "whether they are inverted, shifted or of another clip.", Severity.WRONG)
     EMPTY_MASK = Wording("The mask of {frames} is empty although a person was found there.")
     OTHER_SCENE = Wording("The plate does not show the scene of {frames} (did the camera move?); it is not used there.")
     CAMERA_MOVES = Wording("The camera moves by up to {figure:.0f} px, in {frames}.",

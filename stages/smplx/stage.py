@@ -21,7 +21,7 @@ from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.hidden_arms import describe_arms
 from gsac.stages.smplx.lm.misleading_outlines import fit_unmisled
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, find_seen
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_beside, find_lost_frames, find_seen, notes_that_hold
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
 from gsac.stages.smplx.start.bring import bring_start
@@ -67,10 +67,12 @@ def run(job: Job) -> None:
     masks = pair_masks([path.stem for path in frame_paths(job.inputs["split/frames"])], job.inputs["segment/alpha"])
     if len(masks) != len(sightings.xy):
         raise StageError(f"{len(masks)} frames but {len(sightings.xy)} of key points; run handgap again")
-    if None in masks:
-        job.warn(Finding.of(Code.MASK_MISSING, np.array([mask is None for mask in masks])))
+    if (unmasked := seen & np.array([mask is None for mask in masks])).any():
+        job.warn(Finding.of(Code.MASK_MISSING, unmasked))
     outlines = read_outlines(masks, clip.height, clip.width)
     own = clip.shows_own_moment(len(outlines))
+    if (beside := seen & own & find_beside(outlines, points)).any():
+        job.warn(Finding.of(Code.MASK_BESIDE, beside))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
     sightings = replace(sightings, start=bring_start(job, body, sightings, outlines))
     sightings = leave_out_outside(sightings)
@@ -93,7 +95,8 @@ def run(job: Job) -> None:
     lost = find_lost_frames(fit, seen, sightings.person_height, own)
     fitted = ~np.any(list(lost.values()), axis=0)
     params.sigma_joints[~fitted] = LOST
-    for finding in (*fit.notes, *describe_arms(fit.arms, fitted), *hidden, *describe_lost_frames(lost, fit)):
+    for finding in (*notes_that_hold(fit.notes, beside, seen & own), *describe_arms(fit.arms, fitted), *hidden,
+                    *describe_lost_frames(lost, fit, beside)):
         job.warn(finding)
     if (doubt := doubt_focal(job.config, clip, float(params.focal[0]))) is not None:
         job.warn(doubt)
