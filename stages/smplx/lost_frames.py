@@ -23,6 +23,8 @@ clips have 0.001 at most, pictures whose last row is a twentieth of a turn later
 MOSTLY = 0.5
 """Share of frames of low IoU from which on pictures do not tell where an arm is: where they mix three moments 0.6 to 0.8. With more
 masks beside the person these are to blame, not clothes."""
+BY_MASKS = (Code.CLOTHES_HIDE_SHAPE, Code.PART_HIDDEN)
+"""What is found by masks that are taken to be right."""
 BODY = slice(0, 17)
 """Of the points, COCO's, with the wrists but not the hands."""
 SURE, LEAST = 0.2, 4
@@ -69,10 +71,10 @@ def find_beside(outlines: list[Outline], points: dict[str, np.ndarray]) -> np.nd
 
 
 def notes_that_hold(notes: Iterable[Finding], beside: np.ndarray, seen: np.ndarray) -> list[Finding]:
-    """Those of the fit, without one that blames clothes for masks. beside, seen: (T,) bool, frames whose mask lies beside the
-    person, and frames with a person."""
+    """Those without any that blames clothes, or things before the person, for masks. beside, seen: (T,) bool, frames whose mask
+    lies beside the person, and frames with a person."""
     misled = (beside & seen).sum() > MOSTLY * seen.sum()
-    return [note for note in notes if not (misled and note.code is Code.CLOTHES_HIDE_SHAPE)]
+    return [note for note in notes if not (misled and note.code in BY_MASKS)]
 
 
 def describe_lost_frames(lost: dict[str, np.ndarray], fit: Fit, beside: np.ndarray) -> list[Finding]:

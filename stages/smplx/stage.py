@@ -95,7 +95,7 @@ def run(job: Job) -> None:
     lost = find_lost_frames(fit, seen, sightings.person_height, own)
     fitted = ~np.any(list(lost.values()), axis=0)
     params.sigma_joints[~fitted] = LOST
-    for finding in (*notes_that_hold(fit.notes, beside, seen & own), *describe_arms(fit.arms, fitted), *hidden,
+    for finding in (*notes_that_hold((*fit.notes, *describe_arms(fit.arms, fitted), *hidden), beside, seen & own),
                     *describe_lost_frames(lost, fit, beside)):
         job.warn(finding)
     if (doubt := doubt_focal(job.config, clip, float(params.focal[0]))) is not None:
