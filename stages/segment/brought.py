@@ -58,10 +58,10 @@ def is_inverted(alpha: np.ndarray, xy: np.ndarray, score: np.ndarray) -> bool:
     return bool(edge.mean() > MOSTLY) and share_held(mask, xy, score) < HELD
 
 
-def refuse_inverted(paths: list[Path], inverted: np.ndarray, seen: np.ndarray) -> None:
-    """Raises BadInput where most masks of a person are inverted. paths: T frames; inverted, seen: (T,) bool, frames of such a mask,
-    and of a person."""
-    if inverted.sum() > MOSTLY * seen.sum():
+def refuse_inverted(paths: list[Path], inverted: np.ndarray, score: np.ndarray) -> None:
+    """Raises BadInput where most masks of a person are inverted. paths: T frames; inverted: (T,) bool, those masks; score: (T, 133)
+    of the points."""
+    if inverted.sum() > MOSTLY * score.any(1).sum():
         first = paths[int(np.flatnonzero(inverted)[0])]
         raise BadInput(f"The masks of {name_frames(inverted)}, the first of them {MASKS}/{first.stem}.exr, look inverted: they are "
                        "black where the person is. Masks are white where the person is and black elsewhere; exchange black and "

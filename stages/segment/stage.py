@@ -88,7 +88,7 @@ def use_brought(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray]) -
     how far the camera sways."""
     empty, inverted = np.zeros((2, len(paths)), bool)
     sway = measure_sway(count_views(job, hand_on(paths, job.out / "alpha", keypoints, empty, inverted), len(paths)))
-    refuse_inverted(paths, inverted, keypoints["score"].any(1))
+    refuse_inverted(paths, inverted, keypoints["score"])
     if empty.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: the mask that came with it shows nobody there")
     warn_of_empty(job, empty, keypoints["score"])
