@@ -23,6 +23,8 @@ clips have 0.001 at most, pictures whose last row is a twentieth of a turn later
 MOSTLY = 0.5
 """Share of frames of low IoU from which on pictures do not tell where an arm is: where they mix three moments 0.6 to 0.8. With more
 masks beside the person these are to blame, not clothes."""
+SLIVER = 0.5
+"""Share of the usual area below which a mask is what is left of a person who leaves the picture: there the points are wrong."""
 BY_MASKS = (Code.CLOTHES_HIDE_SHAPE, Code.PART_HIDDEN)
 """What is found by masks that are taken to be right."""
 BODY = slice(0, 17)
@@ -64,10 +66,13 @@ def is_mostly_loose(iou: np.ndarray) -> bool:
     return len(known) > 0 and bool((known < LOOSE_IOU).mean() > MOSTLY)
 
 
-def find_beside(outlines: list[Outline], points: dict[str, np.ndarray]) -> np.ndarray:
-    """(T,) bool, frames whose mask lies beside the person. points: arrays of keypoints.npz, xy (T, 133, 2) px, score (T, 133)."""
-    return np.array([share_held(outline.mask, xy, score, outline.scale) < HELD
-                     for outline, xy, score in zip(outlines, points["xy"], points["score"], strict=True)])
+def find_beside(outlines: list[Outline], points: dict[str, np.ndarray], seen: np.ndarray) -> np.ndarray:
+    """(T,) bool, frames whose mask lies beside the person. points: arrays of keypoints.npz, xy (T, 133, 2) px, score (T, 133); seen:
+    (T,) bool, frames with a person."""
+    area = np.array([outline.area for outline in outlines])
+    least = SLIVER * np.median(area[seen]) if seen.any() else 0.0
+    return seen & (area >= least) & np.array([share_held(outline.mask, xy, score, outline.scale) < HELD for outline, xy, score
+                                              in zip(outlines, points["xy"], points["score"], strict=True)])
 
 
 def notes_that_hold(notes: Iterable[Finding], beside: np.ndarray, seen: np.ndarray) -> list[Finding]:

@@ -71,7 +71,7 @@ def run(job: Job) -> None:
         job.warn(Finding.of(Code.MASK_MISSING, unmasked))
     outlines = read_outlines(masks, clip.height, clip.width)
     own = clip.shows_own_moment(len(outlines))
-    if (beside := seen & own & find_beside(outlines, points)).any():
+    if (beside := find_beside(outlines, points, seen & own)).any():
         job.warn(Finding.of(Code.MASK_BESIDE, beside))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
     sightings = replace(sightings, start=bring_start(job, body, sightings, outlines))

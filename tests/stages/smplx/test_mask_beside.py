@@ -38,6 +38,14 @@ def test_masks_that_lie_beside_the_person_are_named_and_neither_clothes_nor_thin
     assert not {Code.POORLY_COVERED, Code.CLOTHES_HIDE_SHAPE, Code.PART_HIDDEN} & found.keys()
 
 
+def test_what_is_left_of_a_person_who_leaves_the_picture_is_no_mask_beside(inputs, tmp_path):
+    for mask in frame_paths(inputs["segment/alpha"])[4:]:
+        alpha = read_alpha(mask)
+        alpha[:, alpha.shape[1] // 3:] = 0
+        write_alpha(mask, alpha)
+    assert Code.MASK_BESIDE not in said(inputs, tmp_path / "out")
+
+
 def test_of_a_frame_of_nobody_the_missing_mask_is_not_told(inputs, tmp_path):
     points = check_filled_keypoints(inputs["handgap/keypoints.npz"])
     points["score"][2] = 0
