@@ -20,6 +20,7 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
 from gsac.stages.missing_frames import read_keypoints
+from gsac.stages.person_seen import find_seen
 from gsac.stages.segment.brought import MASKS, hand_on, refuse_inverted
 from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
@@ -96,11 +97,11 @@ def use_brought(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray]) -
 
 
 def warn_of_empty(job: Job, empty: np.ndarray, score: np.ndarray) -> None:
-    """Names the frames whose mask is empty though they have points; of those without a person `keypoints` has told.
+    """Names the frames whose mask is empty though they show a person; of the others `keypoints` tells, or `smplx`.
 
     empty: (T,) bool, those masks; score: (T, 133) of the points.
     """
-    unfound = empty & score.any(1)
+    unfound = empty & find_seen(score)
     if unfound.any():
         job.warn(Finding.of(Code.EMPTY_MASK, unfound))
 

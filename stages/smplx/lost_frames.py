@@ -23,26 +23,13 @@ clips have 0.001 at most, pictures whose last row is a twentieth of a turn later
 MOSTLY = 0.5
 """Share of frames of low IoU from which on pictures do not tell where an arm is: where they mix three moments 0.6 to 0.8. With more
 masks beside the person these are to blame, not clothes."""
-SLIVER = 0.5
+SLIVER = 0.6
 """Share of the usual area below which a mask is what is left of a person who leaves the picture: there the points are wrong."""
 BY_MASKS = (Code.CLOTHES_HIDE_SHAPE, Code.PART_HIDDEN)
 """What is found by masks that are taken to be right."""
-BODY = slice(0, 17)
-"""Of the points, COCO's, with the wrists but not the hands."""
-SURE, LEAST = 0.2, 4
-"""Score of a body point that counts, and how many show a person."""
 REPEATED = "the picture is an earlier frame's"
 FAR = 0.05
 """Median reprojection error of a lost frame, as a share of the person's height; a good fit has a tenth of it."""
-
-
-def find_seen(score: np.ndarray, filled: np.ndarray) -> np.ndarray:
-    """(T,) bool, frames with four body points, one of which was detected: filled hands alone are nobody.
-
-    score: (T, 133); filled: (T, 133) bool.
-    """
-    found = score[:, BODY] > SURE
-    return (found.sum(1) >= LEAST) & (found & ~filled[:, BODY].astype(bool)).any(1)
 
 
 def find_lost_frames(fit: Fit, seen: np.ndarray, height: float, own: np.ndarray) -> dict[str, np.ndarray]:
@@ -67,8 +54,8 @@ def is_mostly_loose(iou: np.ndarray) -> bool:
 
 
 def find_beside(outlines: list[Outline], points: dict[str, np.ndarray], seen: np.ndarray) -> np.ndarray:
-    """(T,) bool, frames whose mask lies beside the person. points: arrays of keypoints.npz, xy (T, 133, 2) px, score (T, 133); seen:
-    (T,) bool, frames with a person."""
+    """(T,) bool, frames whose mask lies beside the person. points: arrays of keypoints.npz, xy (T, 133, 2) px, score (T, 133);
+    seen: (T,) bool, frames with a person."""
     area = np.array([outline.area for outline in outlines])
     least = SLIVER * np.median(area[seen]) if seen.any() else 0.0
     return seen & (area >= least) & np.array([share_held(outline.mask, xy, score, outline.scale) < HELD for outline, xy, score

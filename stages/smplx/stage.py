@@ -14,6 +14,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.missing_frames import pair_masks
+from gsac.stages.person_seen import find_seen
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import find_errors
 from gsac.stages.smplx.expression import translate_expression, translate_rest
@@ -21,7 +22,7 @@ from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.hidden_arms import describe_arms
 from gsac.stages.smplx.lm.misleading_outlines import fit_unmisled
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_beside, find_lost_frames, find_seen, notes_that_hold
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_beside, find_lost_frames, notes_that_hold
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
 from gsac.stages.smplx.start.bring import bring_start

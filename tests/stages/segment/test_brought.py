@@ -65,6 +65,10 @@ def test_a_frame_with_a_person_whose_mask_shows_nobody_is_named(spoilt, made, tm
     alphas, warnings = cut(spoilt, tmp_path, tmp_path / "out")
     assert not alphas[2].any() and warnings == ["The mask of frame 2 is empty although a person was found there."]
     assert cut(spoilt, made, tmp_path / "without points")[1] == [], "keypoints has said so"
+    few = np.zeros((4, 133), np.float32)
+    few[:, :3] = 1
+    write_arrays(tmp_path / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=4) | {"score": few})
+    assert cut(spoilt, tmp_path, tmp_path / "few points")[1] == [], "smplx says that no person is seen"
     for t in range(4):
         write_alpha(spoilt / f"frames/masks/{t:06d}.exr", empty)
     with pytest.raises(StageError, match=r"frame 0 \(000000.png\) and all others: .* shows nobody"):

@@ -9,7 +9,7 @@ import pytest
 
 from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.stages.findings import Code, Finding
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, find_seen, is_mostly_loose, notes_that_hold
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, is_mostly_loose, notes_that_hold
 from gsac.stages.smplx.state import Fit
 
 HEIGHT = 1000.0
@@ -56,13 +56,6 @@ def test_frames_without_a_person_are_lost_whatever_their_numbers(good):
     iou[0] = np.nan
     lost, words = said(replace(good, iou=iou, reprojection=np.where(seen, 6, np.nan)), seen)
     assert np.flatnonzero(lost).tolist() == [0] and "no person is seen" in words[0]
-
-
-def test_a_frame_whose_only_points_are_hands_that_were_filled_shows_nobody():
-    score, filled = np.zeros((3, 133)), np.zeros((3, 133), bool)
-    score[0, :6] = score[1:, 7:11] = 0.5
-    filled[1, 7:11] = filled[2, 9:11] = True
-    assert find_seen(score, filled).tolist() == [True, False, True]
 
 
 def test_frames_that_repeat_others_are_lost_without_a_word_for_split_has_named_them(good):
