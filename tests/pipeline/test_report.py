@@ -555,6 +555,10 @@ def test_each_cause_has_one_instruction_for_the_next_clip(metrics, facts, advice
     assert give_advice({"likeness": LIKE}, {"turn_degrees": 360.0, "sharpness": 2.0}) == []
 
 
+def test_who_is_to_step_back_is_not_told_to_come_closer():
+    assert give_advice({"likeness": {"face": {"px": 14.0}}}, {"feet_share": 0.0}) == [Advice.WHOLE]
+
+
 def test_a_camera_that_sways_and_a_person_cut_off_above_are_seen_in_the_pictures_and_told_to_mend(copied):
     noise = cv2.GaussianBlur(np.random.default_rng(2).normal(size=(HEIGHT + 40, WIDTH + 40)).astype(np.float32), (0, 0), 2)
     room = np.repeat(np.clip(128 + 45 * noise / noise.std(), 0, 255)[..., None], 3, 2).astype(np.uint8)
