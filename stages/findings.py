@@ -50,7 +50,7 @@ class Code(Enum):
     SECOND_PERSON = Wording("A second person was seen in {frames}; only the first one is followed.",
                             "Keep others out of the picture or cut these frames.")
     CUT_OFF = Wording("The edge of the picture cuts off {parts}; what lies outside is guessed.",
-                      "Stand in the middle, far enough away that head, hands and feet stay in the picture.")
+                      "Stand in the middle, and farther away if head, hands and feet do not fit into the picture.")
     HAND_NEVER_DETECTED = Wording("The {side} hand was never seen; its fingers stay at rest.", "Show both hands, fingers apart.")
     FACE_NEVER_DETECTED = Wording("The face was never seen from the front; it stays without expression.",
                                   "Look into the camera for a second.")
@@ -62,6 +62,9 @@ class Code(Enum):
                              "points.", Severity.WRONG)
     MASK_MISSING = Wording("The mask of {frames} is missing; the body is fitted to the points alone there.",
                            "Run segment again, or bring all masks.", Severity.WRONG)
+    MASK_BESIDE = Wording("The mask of {frames} lies beside the person, as the points show them.",
+                          "Masks that you bring are white where the person is and black elsewhere, each one its own frame's: look "
+                          "whether they are inverted, shifted or of another clip.", Severity.WRONG)
     EMPTY_MASK = Wording("The mask of {frames} is empty although a person was found there.")
     OTHER_SCENE = Wording("The plate does not show the scene of {frames} (did the camera move?); it is not used there.")
     CAMERA_MOVES = Wording("The camera moves by up to {figure:.0f} px, in {frames}.",

@@ -21,8 +21,8 @@ BELOW = {
     "benchmarks": {"avatar", "cache", "pipeline", "stages", "turntable", "unity", "viewer"},
 }
 """Package -> those it may import; lowest first."""
-SHARED_BY_STAGES = {"contract", "body_choice", "brought_file", "counting", "findings", "first_look", "frame_names",
-                    "missing_frames", "severity", "turn_pace"}
+SHARED_BY_STAGES = {"contract", "body_choice", "brought_file", "counting", "findings", "first_look", "frame_names", "mask_place",
+                    "missing_frames", "person_seen", "severity", "turn_pace"}
 
 
 def modules(package: str) -> dict[str, Path]:

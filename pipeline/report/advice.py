@@ -36,13 +36,14 @@ def give_advice(metrics: dict[str, Any], facts: dict[str, float]) -> list[Advice
     face = ((metrics.get("likeness") or {}).get("face")) or {}
     cut_out = number(metrics.get("alpha_iou_ttpo")) or number(metrics.get("alpha_iou")) or 1
     few = facts.get("photos", FEW_PHOTOS) < FEW_PHOTOS
+    cut_off = min(facts.get("feet_share", 1), facts.get("top_share", 1)) < ENDS
     causes = {
         Advice.PHOTOS: few,
         Advice.TURN: not few and facts.get("turn_degrees", 360) < TURN,
         Advice.ONE_PERSON: facts.get("person_share", 1) < PERSON,
         Advice.STILL: bool(facts.get("moved_frames")),
-        Advice.WHOLE: min(facts.get("feet_share", 1), facts.get("top_share", 1)) < ENDS,
-        Advice.CLOSER: (number(face.get("px")) or FACE_PX) < FACE_PX,
+        Advice.WHOLE: cut_off,
+        Advice.CLOSER: not cut_off and (number(face.get("px")) or FACE_PX) < FACE_PX,
         Advice.FACE: facts.get("face_share", 1) == 0 or facts.get("face_used", 1) == 0,
         Advice.HANDS: any(facts.get(f"{side}_hand_share", 1) < HANDS for side in ("left", "right")),
         Advice.LIGHT: facts.get("brightness", 1) < DARK,

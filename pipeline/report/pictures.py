@@ -157,11 +157,14 @@ class Footage:
         return self._frames[t]
 
     def alpha(self, t: int) -> np.ndarray:
-        """Mask of frame t, (H, W) float32 in 0..1."""
+        """Mask of frame t, (H, W) float32 in 0..1. AbsentError where there is none that can be read."""
         path = self.results.path("segment/alpha") / f"{self.frames[t].stem}.exr"
         if not path.is_file():
             raise AbsentError(f"segment/alpha has no mask for frame {self.frames[t].stem}.")
-        return read_alpha(path)
+        try:
+            return read_alpha(path)
+        except ArtifactError as e:
+            raise AbsentError(f"The mask of frame {self.frames[t].stem} in segment/alpha cannot be read.") from e
 
     def moment(self, t: int) -> str:
         """`frame 12 · 0.40 s`"""

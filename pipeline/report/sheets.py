@@ -154,9 +154,14 @@ def alpha_sheet(footage: Footage) -> Sheet:
         raise AbsentError("segment/alpha has no mask for any frame.")
     chosen = np.flatnonzero(~lacking)
     chosen = chosen[spread_evenly(len(chosen), ALPHA)].tolist()
+    torn = np.zeros(len(lacking), bool)
     pictures, covers, soft, looks, views, cut = [], [], [], [], [], []
     for t in chosen:
-        alpha = footage.alpha(t)
+        try:
+            alpha = footage.alpha(t)
+        except AbsentError:
+            torn[t] = True
+            continue
         looks.append(measure_light(footage.frame(t), alpha))
         views.append(make_view(footage.frame(t), alpha))
         cut.append(sides_touched(alpha))
@@ -164,7 +169,9 @@ def alpha_sheet(footage: Footage) -> Sheet:
         soft.append(float(((alpha > 0.02) & (alpha < 0.98)).sum() / max((alpha >= 0.5).sum(), 1)))
         pictures.append(make_picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
                                 f"{footage.moment(t)}: covers {percent(covers[-1])}", f"Frame {t} cut out, on magenta", frame=t))
-    empty = [t for t, cover in zip(chosen, covers, strict=True) if cover < LEAST_MASK]
+    if not pictures:
+        raise AbsentError("No mask of segment/alpha can be read.")
+    empty = [t for t, cover in zip([t for t in chosen if not torn[t]], covers, strict=True) if cover < LEAST_MASK]
     facts = {"empty_masks": float(footage.person_found[empty].sum())}
     for name, values in zip(("brightness", "sharpness"), zip(*looks, strict=True), strict=True):
         if np.isfinite(values).any():
@@ -182,6 +189,8 @@ def alpha_sheet(footage: Footage) -> Sheet:
             f"{np.nanmax(sway):.0f} px" if np.isfinite(sway).any() else "not known: too plain a background")
     if lacking.any():
         figures["No mask, and not shown"] = name_frames(lacking)
+    if torn.any():
+        figures["Mask cannot be read, and not shown"] = name_frames(torn)
     if empty:
         figures["Empty masks among those shown"] = f"{len(empty)} of {len(covers)}"
     return Sheet(pictures, figures, facts)

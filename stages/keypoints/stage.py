@@ -40,6 +40,8 @@ HARDLY = 0.1
 """Share of the frames below which a person in them makes no avatar."""
 LEAST_TALL = 300
 """px, of a person from whom an avatar has a face."""
+MOSTLY = 0.5
+"""Share of the person's frames of which more must show them from head to feet for their size to be judged."""
 ADVICE = "film one whole person from head to feet, upright, at least a third of the frame high, in good light"
 
 
@@ -58,7 +60,7 @@ def run(job: Job) -> None:
     detector.settle(frames)
     arrays = {name: np.array([getattr(f, name) for f in frames], np.float32) for name in KEYPOINT_SHAPES if name != "detector"}
     report(job, frames, cuts)
-    judge_size(job, FirstLook.of(arrays))
+    judge_size(job, arrays, cuts)
     write_arrays(job.out / "keypoints.npz", detector=np.array(job.config.detector), **arrays)
 
 
@@ -101,8 +103,17 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
         job.warn(Finding.of(Code.FACE_NEVER_DETECTED))
 
 
-def judge_size(job: Job, look: FirstLook) -> None:
-    """Tells what was seen, and warns of a person who is too small for detail."""
-    job.note(look.sentence)
-    if look.height_px < LEAST_TALL:
-        job.warn(Finding.of(Code.SMALL_PERSON, figure=look.height_px))
+def judge_size(job: Job, points: dict[str, np.ndarray], cuts: list[set[Cut]]) -> None:
+    """Tells what was seen, and warns of a person who is too small for detail; not of one who mostly is cut off above or below: what
+    shows tells no height, and to come closer would cut off more.
+
+    points: arrays of keypoints.npz, (T, ...); cuts: one for each frame.
+    """
+    job.note(FirstLook.of(points).sentence)
+    seen = points["score"].any(1)
+    whole = seen & np.array([cut <= {Cut.SIDE} for cut in cuts])
+    if whole.sum() <= MOSTLY * seen.sum():
+        return
+    height = FirstLook.of({name: points[name][whole] for name in ("xy", "score", "world")}).height_px
+    if height < LEAST_TALL:
+        job.warn(Finding.of(Code.SMALL_PERSON, figure=height))

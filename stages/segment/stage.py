@@ -20,7 +20,8 @@ from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
 from gsac.stages.missing_frames import read_keypoints
-from gsac.stages.segment.brought import MASKS, hand_on
+from gsac.stages.person_seen import find_seen
+from gsac.stages.segment.brought import MASKS, hand_on, refuse_inverted
 from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
 from gsac.stages.segment.correction import correct, match_scene
@@ -86,8 +87,9 @@ def run(job: Job) -> None:
 def use_brought(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray]) -> np.ndarray:
     """Hands on the masks that came with the footage. paths: T frames; keypoints: their arrays (T, ...) by name. Returns (T,) px,
     how far the camera sways."""
-    empty = np.zeros(len(paths), bool)
-    sway = measure_sway(count_views(job, hand_on(paths, job.out / "alpha", empty), len(paths)))
+    empty, inverted = np.zeros((2, len(paths)), bool)
+    sway = measure_sway(count_views(job, hand_on(paths, job.out / "alpha", keypoints, empty, inverted), len(paths)))
+    refuse_inverted(paths, inverted, keypoints["score"])
     if empty.all():
         raise StageError(f"frame 0 ({paths[0].name}) and all others: the mask that came with it shows nobody there")
     warn_of_empty(job, empty, keypoints["score"])
@@ -95,11 +97,11 @@ def use_brought(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray]) -
 
 
 def warn_of_empty(job: Job, empty: np.ndarray, score: np.ndarray) -> None:
-    """Names the frames whose mask is empty though they have points; of those without a person `keypoints` has told.
+    """Names the frames whose mask is empty though they show a person; of the others `keypoints` tells, or `smplx`.
 
     empty: (T,) bool, those masks; score: (T, 133) of the points.
     """
-    unfound = empty & score.any(1)
+    unfound = empty & find_seen(score)
     if unfound.any():
         job.warn(Finding.of(Code.EMPTY_MASK, unfound))
 

@@ -14,6 +14,7 @@ from gsac.stages.body_choice import load_body
 from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.missing_frames import pair_masks
+from gsac.stages.person_seen import find_seen
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import find_errors
 from gsac.stages.smplx.expression import translate_expression, translate_rest
@@ -21,7 +22,7 @@ from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.hidden_arms import describe_arms
 from gsac.stages.smplx.lm.misleading_outlines import fit_unmisled
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, find_seen
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_beside, find_lost_frames, notes_that_hold
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
 from gsac.stages.smplx.start.bring import bring_start
@@ -67,10 +68,12 @@ def run(job: Job) -> None:
     masks = pair_masks([path.stem for path in frame_paths(job.inputs["split/frames"])], job.inputs["segment/alpha"])
     if len(masks) != len(sightings.xy):
         raise StageError(f"{len(masks)} frames but {len(sightings.xy)} of key points; run handgap again")
-    if None in masks:
-        job.warn(Finding.of(Code.MASK_MISSING, np.array([mask is None for mask in masks])))
+    if (unmasked := seen & np.array([mask is None for mask in masks])).any():
+        job.warn(Finding.of(Code.MASK_MISSING, unmasked))
     outlines = read_outlines(masks, clip.height, clip.width)
     own = clip.shows_own_moment(len(outlines))
+    if (beside := find_beside(outlines, points, seen & own)).any():
+        job.warn(Finding.of(Code.MASK_BESIDE, beside))
     outlines = [outline if shown else replace(outline, area=0.0) for outline, shown in zip(outlines, own, strict=True)]
     sightings = replace(sightings, start=bring_start(job, body, sightings, outlines))
     sightings = leave_out_outside(sightings)
@@ -93,7 +96,8 @@ def run(job: Job) -> None:
     lost = find_lost_frames(fit, seen, sightings.person_height, own)
     fitted = ~np.any(list(lost.values()), axis=0)
     params.sigma_joints[~fitted] = LOST
-    for finding in (*fit.notes, *describe_arms(fit.arms, fitted), *hidden, *describe_lost_frames(lost, fit)):
+    for finding in (*notes_that_hold((*fit.notes, *describe_arms(fit.arms, fitted), *hidden), beside, seen & own),
+                    *describe_lost_frames(lost, fit, beside)):
         job.warn(finding)
     if (doubt := doubt_focal(job.config, clip, float(params.focal[0]))) is not None:
         job.warn(doubt)

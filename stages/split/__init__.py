@@ -5,10 +5,10 @@ takes  clip: a video file, or a folder of photos, HEIC among them (optional plat
 gives  frames/%06d.png (8-bit RGB), frames/plate.png where there is a plate, frames/masks/%06d.exr where there are masks,
        clip.json (artifacts.Clip)
 
-The rotation tag is applied, HDR is tone-mapped to SDR BT.709, transparency is composited over black and pixels are made square;
-the aspect is kept. Footage taller than split.max_height is cut to the person where that shows them larger, if the networks that
-find people are there (split.crop). Of a video that is cut together of several scenes one is used, the longest that shows a person.
-The same input gives the same bytes.
+The rotation tag is applied, interlaced video is deinterlaced, HDR is tone-mapped to SDR BT.709, transparency is composited over
+black and pixels are made square; the aspect is kept. Footage taller than split.max_height is cut to the person where that shows
+them larger, if the networks that find people are there (split.crop). Of a video that is cut together of several scenes one is used,
+the longest that shows a person. The same input gives the same bytes.
 """
 
 from gsac.avatar.artifacts import check_image_folder

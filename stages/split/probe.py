@@ -13,6 +13,7 @@ from av.container import InputContainer
 
 from gsac.stages.contract import BadInput
 from gsac.stages.split.pick import turn_size
+from gsac.stages.split.picture_file import refuse_picture
 
 HLG, PQ, BT2020_PRIMARIES, BT2020_MATRIX, UNSPECIFIED = 18, 16, 9, 9, 2
 """Code points of ITU-T H.273."""
@@ -47,6 +48,8 @@ class Video:
     primaries: int
     matrix: int
     has_alpha: bool
+    interlaced: bool
+    """Whether its frames are two half pictures each, as camcorders film."""
     decoder: str | None
     """The ffmpeg decoder to use where its default would lose the alpha channel."""
     rate: float | None
@@ -63,7 +66,8 @@ class Video:
 
 
 def probe(path: Path) -> Video:
-    """Raises BadInput where no picture of the file can be decoded."""
+    """Raises BadInput where the file is a picture, or no picture of it can be decoded."""
+    refuse_picture(path)
     try:
         with open_video(path) as container:
             return _probe(container, path)
@@ -126,6 +130,7 @@ def _probe(container: InputContainer, path: Path) -> Video:
         declared_frames=stream.frames, width=width, height=height,
         transfer=int(picture.color_trc), primaries=int(picture.color_primaries), matrix=int(picture.colorspace),
         has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
+        interlaced=picture.interlaced_frame,
         decoder={"vp8": "libvpx", "vp9": "libvpx-vp9"}[codec] if hidden_alpha else None,
         rate=float(rate) if rate else None, tags=tags)
 

@@ -72,12 +72,13 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
                        "Copy the file from the phone again, or cut the clip.")
     video = video if people is None else stand_upright(path, video, people, warn)
     looks: list[Look] = []
-    chains = Chains.of(video, find_alone(path, video)) if config.quick else None
+    chains = Chains.of(video, find_alone(path, video)) if config.quick and not video.interlaced else None
+    whole_pictures = _deinterlace(base) if video.interlaced else []
 
     def write(picks: np.ndarray, crop: Crop | None) -> Written:
         width, height = frame_size(video, config, crop)
         small = fit_size(width, height, HEIGHT)
-        graph = ",".join(_select(video.ticks, picks) + ["showinfo=checksum=0"] + FILTERS[video.quarters]
+        graph = ",".join(whole_pictures + _select(video.ticks, picks) + ["showinfo=checksum=0"] + FILTERS[video.quarters]
                          + _picture_filters(video, crop, width, height))
         output = ["-filter_complex", f"[0:{video.stream}]{graph},format=rgb24,split[whole][fine];"
                                      f"[fine]scale={small[0]}:{small[1]}:flags=area+bitexact,format=rgb24[small]",
@@ -127,7 +128,7 @@ def split_video(path: Path, frames: Path, config: SplitConfig, people: People | 
         repeated |= mirrored
     for finding in findings:
         warn(finding)
-    notes = []
+    notes = ["deinterlaced"] if video.interlaced else []
     if video.transfer in TRANSFER_NAMES:
         notes.append(f"tone-mapped from {TRANSFER_NAMES[video.transfer]} to SDR BT.709")
     if video.has_alpha:
@@ -265,6 +266,11 @@ def see_frames(people: People, frames: Path, crop: Crop) -> Extent | None:
 def _select(ticks: np.ndarray, picks: np.ndarray) -> list[str]:
     """The filter that keeps the picked presentation times; no filter where all are kept."""
     return [] if len(picks) == len(ticks) else [f"select='{_any_of([f'eq(pts,{tick})' for tick in ticks[picks]])}'"]
+
+
+def _deinterlace(base: Fraction) -> list[str]:
+    """Filters that make each frame a picture of one moment by its neighbours, at the time that it had, counted in `base`."""
+    return ["bwdif=mode=send_frame:deint=interlaced", f"settb={base}"]
 
 
 def _leave_out(sent: np.ndarray, needed: np.ndarray) -> list[str]:

@@ -88,8 +88,8 @@ def run(job: Job) -> None:
         raise StageError("segment/alpha: every mask is empty, there is no person to train on; look at segment")
     usable = np.ones(count, bool)
     usable[empty] = False
-    if empty:
-        job.warn(Finding.of(Code.MASK_NOT_TRAINED, ~usable))
+    if (unmasked := ~usable & ~params.lost).any():  # of the others smplx has told
+        job.warn(Finding.of(Code.MASK_NOT_TRAINED, unmasked))
     if (failed := usable & params.lost & clip.shows_own_moment(count)).any():
         job.warn(Finding.of(Code.POSE_NOT_TRAINED, failed))
     usable &= ~params.lost

@@ -289,6 +289,17 @@ def test_a_frame_without_a_mask_costs_its_own_picture_and_is_named(copied):
     assert "segment/alpha has no mask for any frame." in page_of(copied).text("alpha")
 
 
+def test_a_torn_mask_costs_its_own_picture_and_is_named(copied):
+    masks = sorted((copied / "segment/alpha").iterdir())
+    masks[2].write_bytes(masks[2].read_bytes()[:11])
+    page = page_of(copied)
+    assert len(page.images("alpha")) == T - 1 and "Mask cannot be read, and not shown frame 2" in page.text("alpha")
+    assert len(page.images("body")) == T
+    for mask in masks:
+        mask.write_bytes(b"torn")
+    assert "No mask of segment/alpha can be read." in page_of(copied).text("alpha")
+
+
 def test_the_worst_held_out_frame_is_named(whole):
     page = Page(whole / "report.html")
     assert "frame 4, 21.25 dB on the person (the worst frame)" in page.text("heldout")
@@ -542,6 +553,10 @@ def test_without_held_out_frames_nothing_is_called_good():
 def test_each_cause_has_one_instruction_for_the_next_clip(metrics, facts, advice):
     assert give_advice(metrics, facts) == [advice]
     assert give_advice({"likeness": LIKE}, {"turn_degrees": 360.0, "sharpness": 2.0}) == []
+
+
+def test_who_is_to_step_back_is_not_told_to_come_closer():
+    assert give_advice({"likeness": {"face": {"px": 14.0}}}, {"feet_share": 0.0}) == [Advice.WHOLE]
 
 
 def test_a_camera_that_sways_and_a_person_cut_off_above_are_seen_in_the_pictures_and_told_to_mend(copied):

@@ -16,7 +16,7 @@ from gsac.stages.keypoints import STAGE
 from gsac.stages.keypoints.config import MODELS, DetectorName, KeypointsConfig
 from gsac.stages.keypoints.cut_off import Cut, find_cuts
 from gsac.stages.keypoints.detection import Frame
-from gsac.stages.keypoints.stage import DETECTORS, report, run
+from gsac.stages.keypoints.stage import DETECTORS, judge_size, report, run
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
 SQUATS, TRUTH = FOOTAGE / "squats" / "pose_squats.mp4", FOOTAGE / "truth-a" / "clip.mp4"
@@ -148,6 +148,22 @@ def test_which_part_the_edge_cuts_off_is_said_with_its_frames():
     whole = dict(HANDS, face=FACE)
     warning, = warnings_of([seen(**whole)] * 4, [{Cut.HEAD, Cut.FEET}, {Cut.FEET}, set(), {Cut.FEET}])
     assert warning.startswith("The edge of the picture cuts off the head in frame 0, the feet in 3 of 4 frames (0-1, 3); what lies")
+
+
+def sizes_told(*cut: set[Cut], height: float = 100) -> list[str]:
+    """Of a person whose seen points span `height` px in each frame."""
+    found = []
+    xy = np.zeros((len(cut), 133, 2), np.float32)
+    xy[:, 0, 1] = height
+    arrays = {"xy": xy, "score": np.ones((len(cut), 133), np.float32), "world": np.full((len(cut), 133, 3), np.nan, np.float32)}
+    judge_size(Job({}, Path(), None, warn=lambda finding: found.append(finding.code.word)), arrays, list(cut))
+    return found
+
+
+def test_who_is_cut_off_above_or_below_is_not_told_to_come_closer():
+    assert sizes_told({Cut.FEET}, {Cut.FEET, Cut.SIDE}, set()) == sizes_told({Cut.OTHER}, {Cut.HEAD}) == []
+    assert sizes_told({Cut.SIDE}, {Cut.FEET}, set()) == sizes_told(set()) == ["small_person"]
+    assert sizes_told(set(), height=400) == []
 
 
 @pytest.mark.footage

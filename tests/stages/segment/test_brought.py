@@ -65,10 +65,41 @@ def test_a_frame_with_a_person_whose_mask_shows_nobody_is_named(spoilt, made, tm
     alphas, warnings = cut(spoilt, tmp_path, tmp_path / "out")
     assert not alphas[2].any() and warnings == ["The mask of frame 2 is empty although a person was found there."]
     assert cut(spoilt, made, tmp_path / "without points")[1] == [], "keypoints has said so"
+    few = np.zeros((4, 133), np.float32)
+    few[:, :3] = 1
+    write_arrays(tmp_path / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=4) | {"score": few})
+    assert cut(spoilt, tmp_path, tmp_path / "few points")[1] == [], "smplx says that no person is seen"
     for t in range(4):
         write_alpha(spoilt / f"frames/masks/{t:06d}.exr", empty)
     with pytest.raises(StageError, match=r"frame 0 \(000000.png\) and all others: .* shows nobody"):
         cut(spoilt, made, tmp_path / "again")
+
+
+def lay_points_on_masks(root, out):
+    """keypoints.npz in `out` with sure body points on the masks of the frames in `root`."""
+    score, xy = np.zeros((4, 133), np.float32), np.zeros((4, 133, 2), np.float32)
+    score[:, :17] = 0.9
+    for t in range(4):
+        row, column = np.nonzero(read_alpha(root / f"frames/masks/{t:06d}.exr") > 0.5)
+        at = np.linspace(0, len(row) - 1, 17).astype(int)
+        xy[t, :17] = np.stack([column[at], row[at]], 1) + 0.5
+    write_arrays(out / "keypoints.npz", **blank(KEYPOINT_SHAPES, T=4) | {"xy": xy, "score": score})
+
+
+def invert(root, *frames):
+    for t in frames:
+        path = root / f"frames/masks/{t:06d}.exr"
+        write_alpha(path, 1 - read_alpha(path))
+
+
+def test_masks_that_are_mostly_inverted_are_refused_by_name(spoilt, tmp_path):
+    lay_points_on_masks(spoilt, tmp_path)
+    assert cut(spoilt, tmp_path, tmp_path / "right")[1] == []
+    invert(spoilt, 1, 2)
+    cut(spoilt, tmp_path, tmp_path / "half of them")
+    invert(spoilt, 3)
+    with pytest.raises(BadInput, match=r"masks of 3 of 4 frames \(1-3\), the first of them masks/000001.exr, look inverted"):
+        cut(spoilt, tmp_path, tmp_path / "most of them")
 
 
 def test_footage_without_masks_and_frames_without_one_are_refused(spoilt, made, tmp_path):

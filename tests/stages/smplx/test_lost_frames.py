@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import LOST, Body, BodyParams
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, find_seen, is_mostly_loose
+from gsac.stages.findings import Code, Finding
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, is_mostly_loose, notes_that_hold
 from gsac.stages.smplx.state import Fit
 
 HEIGHT = 1000.0
@@ -19,10 +20,12 @@ def good() -> Fit:
     return Fit(None, np.full((10, 55), 0.01), np.full(10, 0.88), np.full(10, 6.0), 20)
 
 
-def said(fit: Fit, seen: np.ndarray | None = None, own: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
+def said(fit: Fit, seen: np.ndarray | None = None, own: np.ndarray | None = None,
+         beside: np.ndarray | None = None) -> tuple[np.ndarray, list[str]]:
     lost = find_lost_frames(fit, np.ones(10, bool) if seen is None else seen, HEIGHT, np.ones(10, bool) if own is None else own)
     assert np.sum(list(lost.values()), axis=0).max() <= 1  # one reason a frame
-    return np.any(list(lost.values()), axis=0), [finding.message for finding in describe_lost_frames(lost, fit)]
+    return np.any(list(lost.values()), axis=0), [finding.message for finding in describe_lost_frames(
+        lost, fit, np.zeros(10, bool) if beside is None else beside)]
 
 
 def test_a_good_fit_loses_nothing_and_says_nothing(good):
@@ -53,13 +56,6 @@ def test_frames_without_a_person_are_lost_whatever_their_numbers(good):
     iou[0] = np.nan
     lost, words = said(replace(good, iou=iou, reprojection=np.where(seen, 6, np.nan)), seen)
     assert np.flatnonzero(lost).tolist() == [0] and "no person is seen" in words[0]
-
-
-def test_a_frame_whose_only_points_are_hands_that_were_filled_shows_nobody():
-    score, filled = np.zeros((3, 133)), np.zeros((3, 133), bool)
-    score[0, :6] = score[1:, 7:11] = 0.5
-    filled[1, 7:11] = filled[2, 9:11] = True
-    assert find_seen(score, filled).tolist() == [True, False, True]
 
 
 def test_frames_that_repeat_others_are_lost_without_a_word_for_split_has_named_them(good):
@@ -108,3 +104,12 @@ def test_the_mark_is_read_back_from_the_joints_spread():
     params.sigma_joints[:] = 0.1
     params.sigma_joints[1] = LOST
     assert params.lost.tolist() == [False, True, False]
+
+
+def test_where_the_mask_lies_beside_the_person_no_clothes_are_blamed(good):
+    beside = np.arange(10) < 4
+    assert said(replace(good, iou=np.where(beside, 0.75, 0.95)), beside=beside)[1] == []
+    assert "wide clothes" in said(replace(good, iou=np.full(10, 0.75)), beside=beside)[1][0]
+    clothes, focal = Finding.of(Code.CLOTHES_HIDE_SHAPE, figure=5.0), Finding.of(Code.TURNED_OVER, beside)
+    assert notes_that_hold([clothes, focal], beside, np.ones(10, bool)) == [clothes, focal]
+    assert notes_that_hold([clothes, focal], beside, np.arange(10) < 7) == [focal], "of most masks the person lies beside"

@@ -9,10 +9,13 @@ import av
 import cv2
 import imageio_ffmpeg
 import numpy as np
+import pillow_heif
 import pytest
+from PIL import Image
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.stages.contract import BadInput, Job
+from gsac.stages.split import video as video_stage
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.stage import run
 
@@ -107,6 +110,41 @@ def test_ten_bit_hdr_is_tone_mapped_to_what_sdr_shows(tmp_path, transfer):
     assert got.max() > 190 and got.min() < 10
 
 
+def make_camcorder_clip(path, *encode):
+    """A bright bar that crosses the picture, filmed as 50 half pictures a second, two in each frame."""
+    ffmpeg("-f", "lavfi", "-i", "color=black:size=320x240:rate=50:duration=2", "-f", "lavfi", "-i",
+           "color=white:size=40x240:rate=50:duration=2", "-filter_complex",
+           "[0][1]overlay=x=20+120*t:y=0,tinterlace=mode=interleave_top,setfield=tff", *encode, path)
+    return path
+
+
+def combing(frame):
+    """Mean difference of a row from those above and below it. frame: (H, W, 3) uint8."""
+    rows = frame.astype(float)
+    return np.abs(rows[1:-1] - (rows[:-2] + rows[2:]) / 2).mean()
+
+
+@pytest.mark.parametrize("encode", [("-c:v", "libx264", "-flags", "+ilme+ildct", "-bf", "2", "-crf", "10"),
+                                    ("-c:v", "mpeg2video", "-flags", "+ilme+ildct", "-q:v", "2", "-f", "mpegts")])
+@pytest.mark.parametrize("quick", [False, True])
+def test_frames_of_two_half_pictures_come_without_combs_at_their_own_times(tmp_path, encode, quick):
+    source = make_camcorder_clip(tmp_path / "clip.mts", *encode)
+    clip, frames, warnings = split(source, tmp_path / "out", count=10, quick=quick)
+    assert len(frames) == 10 and clip.notes == ["deinterlaced"] and not any("damaged" in warning for warning in warnings)
+    assert max(map(combing, frames)) < 0.5
+    middle = [float((frame[100, :, 0] * np.arange(320.0)).sum() / frame[100, :, 0].sum()) for frame in frames]
+    assert middle == pytest.approx([40 + 120 * time for time in clip.timestamps_s], abs=4)
+
+
+def test_a_progressive_video_is_not_deinterlaced(tmp_path, monkeypatch):
+    graphs = []
+    run_ffmpeg = video_stage._run
+    monkeypatch.setattr(video_stage, "_run", lambda path, video, output, *rest: graphs.append(output[1]) or run_ffmpeg(
+        path, video, output, *rest))
+    assert split(make_clip(tmp_path / "a.mp4", seconds=0.2), tmp_path / "out")[0].notes == []
+    assert graphs and not any("dif" in graph for graph in graphs)
+
+
 def test_odd_sizes_and_tall_frames_keep_their_aspect(tmp_path):
     source = make_clip(tmp_path / "a.mkv", "-c:v", "libx264", "-pix_fmt", "yuv444p", size="161x243", seconds=0.2)
     clip, _, _ = split(source, tmp_path / "1")
@@ -167,6 +205,14 @@ def test_what_is_not_a_video_is_bad_input(tmp_path, content):
     source.write_bytes(content)
     with pytest.raises(BadInput, match="notes.mp4"):
         split(source, tmp_path / "out")
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP", "BMP", "TIFF", "HEIF"])
+def test_a_photo_under_a_videos_name_is_said_to_be_a_picture(tmp_path, kind):
+    pillow_heif.register_heif_opener()
+    Image.new("RGB", (90, 160)).save(tmp_path / "clip.mp4", format=kind)
+    with pytest.raises(BadInput, match=r"clip.mp4: is a picture \(.*\) under a video's name. Give .* name it clip\.\w+"):
+        split(tmp_path / "clip.mp4", tmp_path / "out")
 
 
 PLAYLISTS = {

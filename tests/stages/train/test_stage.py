@@ -174,6 +174,18 @@ def test_frames_without_a_fitted_body_are_neither_trained_on_nor_judged(job_anyw
     assert any("2 of 12 frames (2-3)" in warning for warning in made.warnings)
 
 
+def test_of_a_frame_of_nobody_that_was_not_fitted_the_empty_mask_is_not_told_again(job):
+    made = job(frames=6, blank=(2, 3), steps=2, gaussians=200, pose_test_steps=0)
+    path = made.inputs["smplx/body.npz"]
+    params = BodyParams.read(path)
+    params.sigma_joints[2] = LOST
+    params.write(path)
+    run(made)
+    assert [warning for warning in made.warnings if "not trained on" in warning] == [
+        "The mask is empty or missing in frame 3; not trained on."]
+    assert metrics(made)["trained_frames"] + len(metrics(made)["heldout_frames"]) == 4
+
+
 def test_masks_that_are_all_empty_stop_the_stage(job):
     made = job(frames=2, blank=(0, 1), steps=5)
     with pytest.raises(StageError, match="every mask is empty"):
