@@ -20,7 +20,7 @@ from gsac.avatar.yaw import yaw
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.jacobians import make_pairs, place_points
+from gsac.stages.smplx.jacobians import Pairs, make_pairs, place_points
 from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, measure_uncovered, move, settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, widen_arm
@@ -45,6 +45,9 @@ FAR_OFF = 5.0
 """Factor on the robust limit before the outline counts: an arm that starts hanging has a long way to go."""
 ROUNDS_DEPTH_SPREAD = 0.8
 """m, of the detector's depth in the rounds, once limbs point the right way: its depth leans with the camera, the images do not."""
+FOLLOWED = 0.6
+"""Share of the usual IoU below which the body does not follow a frame: where hands hide 0.85 and more, in a skirt 0.8, of a person
+who has left 0.4 at most."""
 TRUNK_STEPS = 4
 """Steps in which only the root and the place move."""
 VIEW = np.radians(30)
@@ -64,7 +67,8 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     moved = np.zeros((len(sightings.xy), 2), bool)
     if arms_told:
         state, moved = move_contradicted(hidden, problem, state, sightings.missing)
-    hidden.find(problem, state, sightings.missing)
+    if sightings.missing is not None and sightings.missing.any():
+        hidden.find(problem, state, sightings.missing, find_followed(problem, state, sightings))
     if arms_told:
         state = search_hidden(hidden, problem, state)
     iou = np.full(len(sightings.xy), np.nan)
@@ -223,9 +227,22 @@ def measure_world_scale(problem: Problem, state: State, sightings: Sightings) ->
 
 def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
     """Gives the problem new outline points, from the posed body. Returns the IoU (T,) of body and alpha, NaN without alpha."""
-    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
-    problem.outline_pairs, iou = sample_outlines(problem.body, params, sightings.width, sightings.height, problem.seen.outlines)
+    problem.outline_pairs, iou = meet_outlines(problem, state, sightings)
     return iou
+
+
+def meet_outlines(problem: Problem, state: State, sightings: Sightings) -> tuple[list[Pairs | None], np.ndarray]:
+    """`sample_outlines` of the body as it is."""
+    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
+    return sample_outlines(problem.body, params, sightings.width, sightings.height, problem.seen.outlines)
+
+
+def find_followed(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
+    """(T,) bool, frames whose points and mask the body follows: others, after the person has left, say, tell of no hand."""
+    _, iou = meet_outlines(problem, state, sightings)
+    known = iou[np.isfinite(iou)]
+    far = iou < FOLLOWED * np.median(known) if len(known) else np.zeros(len(iou), bool)
+    return np.isfinite(problem.seen.spread).any(1) & ~far
 
 
 def fit_fingers(sightings: Sightings, detector: Detector, problem: Problem, state: State, config: SmplxConfig) -> tuple[State, int]:

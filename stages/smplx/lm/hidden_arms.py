@@ -129,22 +129,23 @@ class HiddenArms:
         left, right = (sample_surface(body, weights[:, arm[2:]].sum(1) > 0.5, ARM_SAMPLES) for arm in ARM_JOINTS)
         return cls(sample_surface(body, weights[:, TRUNK_JOINTS].sum(1) > 0.8, TRUNK_SAMPLES), (left, right), height, [])
 
-    def find(self, problem: Problem, state: State, missing: np.ndarray | None) -> None:
+    def find(self, problem: Problem, state: State, missing: np.ndarray, followed: np.ndarray) -> None:
         """Finds the stays: hands that were not detected where the fit, or the arm as it usually is, has them in plain view. Where
         only the fit has, its wrists are made up and do not count.
 
-        missing: (T, 2) bool, hands that were not detected; None: all were.
+        missing: (T, 2) bool, hands that were not detected; followed: (T,) bool, frames that tell of a hand by its absence.
         """
         seconds = problem.seen.seconds
-        if seconds is None or missing is None:
+        if seconds is None:
             return
         chain = problem.skeleton.pose(state.local, state.shape)
         least = max(1.0, LEAST_S / float(np.median(np.diff(seconds)))) if len(seconds) > 1 else np.inf
         for side in (0, 1):
             found = []
             usual = find_usual(state.local[~missing[:, side].astype(bool)][:, ARM_JOINTS[side]])
-            for first, last in bridge(missing[:, side]):
-                lost = first + np.flatnonzero(missing[first:last, side])
+            absent = missing[:, side].astype(bool) & followed
+            for first, last in bridge(absent):
+                lost = first + np.flatnonzero(absent[first:last])
                 if len(lost) < least:
                     continue
                 against = sum(self.contradict(problem, state, chain.frame(t), t, side) for t in lost.tolist())

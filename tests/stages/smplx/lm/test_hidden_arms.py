@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm import hidden_search
-from gsac.stages.smplx.lm.fit import fit_clip, fit_points, set_up
+from gsac.stages.smplx.lm.fit import find_followed, fit_clip, fit_points, set_up
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, QUICK, STILL, HiddenArms, Stay, bridge, describe_arms, find_usual
 from gsac.stages.smplx.lm.hidden_arms import WRIST as WRIST_ROW
 from gsac.stages.smplx.lm.hidden_search import search_hidden
@@ -25,6 +27,7 @@ from gsac.stages.smplx.state import to_params
 from support.turning_person import HEIGHT, WIDTH, height_of, joint_error_mm, outlines_of, sightings_of, turning_person
 
 FRAMES, HIDDEN, MISREAD = 16, slice(0, 7), slice(0, 11)
+FOLLOWED = np.ones(FRAMES, bool)
 ELBOW, WRIST = INDEX["left_elbow"], INDEX["left_wrist"]
 
 
@@ -88,7 +91,7 @@ def test_a_hand_that_the_body_covers_is_not_searched_again(body, tmp_path):
     missing[3:7, 0] = missing[9:12, 1] = True  # the far arm of either side view
     problem, state = start_of(body, seen, outlines_of(body, truth, tmp_path), SmplxConfig(height_m=height_of(body, truth)))
     arms = HiddenArms.of(body, seen.person_height)
-    arms.find(problem, state, missing)
+    arms.find(problem, state, missing, FOLLOWED)
     assert not arms.stays
 
 
@@ -103,7 +106,7 @@ def test_a_far_arm_that_may_hang_as_usual_hides_nothing_and_its_made_up_wrist_do
     arms = HiddenArms.of(body, seen.person_height)
     chain = problem.skeleton.pose(state.local, state.shape)
     assert arms.contradict(problem, state, chain.frame(5), 5, 0) > 0
-    arms.find(problem, state, missing)
+    arms.find(problem, state, missing, FOLLOWED)
     assert not arms.stays
     assert np.isinf(problem.seen.spread[3:7, WRIST_ROW[0]]).all() and np.isfinite(problem.seen.spread[:, WRIST_ROW[1]]).all()
 
@@ -117,8 +120,22 @@ def test_a_hand_that_would_be_seen_if_its_arm_hung_as_usual_is_hidden_though_not
     state.local[HIDDEN, ARM_JOINTS[0, 1:3]] = Rotation.from_rotvec([[0.8, 0.3, -1.4], [0.5, -1.25, 0]]).as_matrix()
     chain = problem.skeleton.pose(state.local, state.shape)
     assert not any(arms.contradict(problem, state, chain.frame(t), t, 0) for t in range(7))
-    arms.find(problem, state, missing)
+    arms.find(problem, state, missing, FOLLOWED)
     assert [(stay.side, stay.first, stay.last) for stay in arms.stays] == [(0, 0, 7)]
+    alone = HiddenArms.of(body, seen.person_height)
+    alone.find(problem, state, missing, ~missing[:, 0])
+    assert not alone.stays  # frames that the body does not follow tell of no hand
+
+
+def test_a_frame_is_not_followed_whose_mask_lies_elsewhere_or_that_shows_nobody(body, tmp_path):
+    truth = turning_person(body, FRAMES)
+    seen, outlines = sightings_of(body, truth), outlines_of(body, truth, tmp_path)
+    problem, state = start_of(body, seen, outlines, SmplxConfig(height_m=height_of(body, truth)))
+    assert find_followed(problem, state, seen).all()
+    aside = replace(outlines[3], mask=np.roll(outlines[3].mask, outlines[3].mask.shape[1] // 3, 1))
+    problem.seen.outlines = [*outlines[:3], aside, *outlines[4:]]
+    problem.seen.spread[9] = np.inf
+    assert np.flatnonzero(~find_followed(problem, state, seen)).tolist() == [3, 9]
 
 
 def test_a_hand_rests_on_the_back_also_in_frames_that_show_it_there_and_no_longer(body, tmp_path):
@@ -153,7 +170,7 @@ def test_one_frame_in_plain_view_is_enough_where_frames_are_far_apart(body, tmp_
     missing[4, 0] = True
     problem.seen.seconds = apart * np.arange(FRAMES)
     arms = HiddenArms.of(body, seen.person_height)
-    arms.find(problem, state, missing)
+    arms.find(problem, state, missing, FOLLOWED)
     assert [(stay.side, stay.first, stay.last) for stay in arms.stays] == ([(0, 4, 5)] if noticed else [])
 
 
@@ -167,7 +184,7 @@ def test_a_frame_without_a_mask_does_not_break_the_search(body, tmp_path):
     missing = np.zeros((FRAMES, 2), bool)
     missing[2:6, 0] = True
     arms = HiddenArms.of(body, seen.person_height)
-    arms.find(problem, state, missing)
+    arms.find(problem, state, missing, FOLLOWED)
     assert arms.stays and np.isfinite(search_hidden(arms, problem, state).local).all()
 
 
@@ -180,7 +197,7 @@ def test_an_arm_whose_hand_is_out_of_sight_rests_unless_that_costs_too_much(body
     missing = np.zeros((FRAMES, 2), bool)
     missing[HIDDEN, 0] = True
     arms = HiddenArms.of(body, seen.person_height)
-    arms.find(problem, state, missing)
+    arms.find(problem, state, missing, FOLLOWED)
     search_hidden(arms, problem, state)
     (stay,) = arms.stays
     left, right = (np.isin(problem.active, joints) for joints in ARM_JOINTS)
@@ -237,7 +254,7 @@ def test_a_forearm_beside_the_body_and_outside_the_mask_counts_for_half_a_frame(
     missing = np.zeros((FRAMES, 2), bool)
     missing[3:3 + lost, 0] = True
     found = HiddenArms(arms.trunk, arms.forearm, arms.height, [])
-    found.find(problem, state, missing)
+    found.find(problem, state, missing, FOLLOWED)
     assert [(stay.side, stay.first, stay.last) for stay in found.stays] == ([(0, 3, 3 + lost)] if noticed else [])
     chain = problem.skeleton.pose(state.local, state.shape)
     assert [arms.contradict(problem, state, chain.frame(4), 4, side) for side in (0, 1)] == [0.5, 0.0]
