@@ -81,5 +81,5 @@ def carry_corrections(pose: np.ndarray, transl: np.ndarray, refined_pose: np.nda
 
 def is_near(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """(...) bool, whether the body turned by less than NEAR. one, other: (..., 3) axis-angle, global_orient."""
-    turn = Rotation.from_rotvec(np.reshape(one, (-1, 3))).inv() * Rotation.from_rotvec(np.reshape(other, (-1, 3)))
-    return (turn.magnitude() < NEAR).reshape(np.shape(one)[:-1])
+    turns, others = (Rotation.from_rotvec(np.reshape(each, (-1, 3))) for each in map(np.array, np.broadcast_arrays(one, other)))
+    return ((turns.inv() * others).magnitude() < NEAR).reshape(np.broadcast_shapes(one.shape, other.shape)[:-1])

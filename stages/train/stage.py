@@ -351,8 +351,8 @@ class Run:
             "psnr_fg_train": of_trained,
             "pose_at_test": {
                 "psnr_fg": "between the refined poses of the neighbouring trained frames, plus what the body fit has beside its "
-                           "own there, as far as that proved right in trained frames; at the clip's ends and between far views the "
-                           "fit's pose with the neighbours' correction; the held-out image is not used",
+                           "own there, as far as that proved right in trained frames; in the first and last frame and between far "
+                           "views the fit's pose with the neighbours' correction; the held-out image is not used",
                 "*_ttpo": f"that pose, {config.pose_test_steps} steps optimised on the held-out image, and moved once more onto "
                           "it as filmed; avatar frozen",
                 "psnr_fg_fit": "the body fit's pose as it came",

@@ -11,8 +11,8 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.stages.train.choose_heldout import is_near
 
-SIDE = 2
-"""Trained frames on each side that a frame is interpolated between."""
+SIDES = (2, 2), (2, 1), (1, 2)
+"""Trained frames before and after a frame that it is interpolated between: one is enough where the clip has no more."""
 LONGEST = 4
 """Most frames from one trained neighbour to the other: a cubic overshoots in longer gaps."""
 FEWEST = 10
@@ -21,33 +21,39 @@ FEWEST = 10
 
 def follow_neighbours(fit_pose: np.ndarray, fit_transl: np.ndarray, pose: np.ndarray, transl: np.ndarray,
                       trained: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Moves untrained frames to the cubic of their trained neighbours plus the trusted share of their own deviation.
+    """Moves untrained frames to the polynomial through their trained neighbours plus the trusted share of their own deviation.
 
     pose (T, J, 3) axis-angle and transl (T, 3) m are refined where trained (T,) bool; fit_pose (T, J, 3) and fit_transl (T, 3) are
-    the body fit's. Frames without two neighbours on each side, near in time and yaw, stay. Returns pose (T, J, 3), transl (T, 3).
+    the body fit's. Frames without such neighbours, near in time and yaw, stay. Returns pose (T, J, 3), transl (T, 3).
     """
-    frames, out_pose, out_transl = np.flatnonzero(trained), pose.copy(), transl.copy()
-    around = {t: found for t in range(len(pose)) if (found := find_neighbours(t, frames, fit_pose[:, 0])) is not None}
-    fit, own = Motion(fit_pose, fit_transl), Motion(pose, transl)
-    known = [t for t in around if trained[t]]
-    if len(known) < FEWEST:
-        return out_pose, out_transl
-    share = trusted_share(*(np.stack([motion.deviation(t, around[t]) for t in known]) for motion in (fit, own)))
-    for t in around:
-        if not trained[t]:
-            turns, place = own.cubic(t, around[t])
-            deviation = share * fit.deviation(t, around[t])
-            out_pose[t], out_transl[t] = rotation.log(rotation.exp(deviation[:-1]) @ turns), place + deviation[-1]
+    frames, others, out_pose, out_transl = np.flatnonzero(trained), np.flatnonzero(~trained), pose.copy(), transl.copy()
+    fit, own, most = Motion(fit_pose, fit_transl), Motion(pose, transl), max(SIDES[0])
+    for before, after in SIDES:
+        asked = others[(np.minimum(np.searchsorted(frames, others), most) == before)
+                       & (np.minimum(len(frames) - np.searchsorted(frames, others), most) == after)]
+        moved, between = find_neighbours(asked, frames, fit_pose[:, 0], before, after)
+        known, among = find_neighbours(frames, frames, fit_pose[:, 0], before, after)
+        if len(moved) and len(known) >= FEWEST:
+            share = trusted_share(fit.deviation(known, among), own.deviation(known, among))
+            (turns, places), deviation = own.between(moved, between), share * fit.deviation(moved, between)
+            out_pose[moved] = rotation.log(rotation.exp(deviation[:, :-1]) @ turns)
+            out_transl[moved] = places + deviation[:, -1]
     return out_pose, out_transl
 
 
-def find_neighbours(t: int, frames: np.ndarray, global_orient: np.ndarray) -> np.ndarray | None:
-    """(2 SIDE,) of frames (n,), without t, that t can be interpolated between, or None. global_orient: (T, 3) axis-angle."""
-    before, after = frames[frames < t][-SIDE:], frames[frames > t][:SIDE]
-    found = np.append(before, after)
-    if len(found) < 2 * SIDE or after[0] - before[-1] > LONGEST or not is_near(global_orient[found], global_orient[t]).all():
-        return None
-    return found
+def find_neighbours(asked: np.ndarray, frames: np.ndarray, global_orient: np.ndarray, before: int,
+                    after: int) -> tuple[np.ndarray, np.ndarray]:
+    """Those of the frames asked (m,) that have as many neighbours among frames (n,), itself left out, near in time and yaw.
+
+    global_orient: (T, 3) axis-angle. Returns (k,) frames, (k, before + after) their neighbours.
+    """
+    first, end = np.searchsorted(frames, asked), np.searchsorted(frames, asked, side="right")
+    enough = (first >= before) & (end + after <= len(frames))
+    asked, first, end = asked[enough], first[enough], end[enough]
+    around = frames[np.concatenate([first[:, None] + np.arange(-before, 0), end[:, None] + np.arange(after)], 1)]
+    near = around[:, before] - around[:, before - 1] <= LONGEST
+    near &= is_near(global_orient[around], global_orient[asked, None]).all(1)
+    return asked[near], around[near]
 
 
 def trusted_share(fit: np.ndarray, own: np.ndarray) -> np.ndarray:
@@ -65,14 +71,21 @@ class Motion:
     def __init__(self, pose: np.ndarray, transl: np.ndarray):
         self.turns, self.places = rotation.exp(np.asarray(pose, np.float64)), np.asarray(transl, np.float64)
 
-    def cubic(self, t: int, around: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rotations (J, 3, 3) and translation (3,) m at t by the cubic through frames around (2 SIDE,), relative to one of them."""
-        weight = np.array([np.prod([(t - other) / (frame - other) for other in around if other != frame]) for frame in around])
-        middle = self.turns[around[SIDE]]
-        steps = rotation.log(middle.swapaxes(1, 2) @ self.turns[around])
-        return middle @ rotation.exp(np.tensordot(weight, steps, 1)), weight @ self.places[around]
+    def between(self, frames: np.ndarray, around: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rotations (n, J, 3, 3) and translations (n, 3) m at frames (n,) by the polynomials through those around them (n, k).
 
-    def deviation(self, t: int, around: np.ndarray) -> np.ndarray:
-        """(J + 1, 3) turns in the axes of each joint's parent, rad, and shift, m, from the cubic of around (2 SIDE,) to frame t."""
-        turns, place = self.cubic(t, around)
-        return np.vstack([rotation.log(self.turns[t] @ turns.swapaxes(1, 2)), self.places[t] - place])
+        Rotations are taken relative to one of these.
+        """
+        k = around.shape[1]
+        ahead, apart = (frames[:, None] - around)[:, None], around[:, :, None] - around[:, None]
+        weight = np.where(np.eye(k, dtype=bool), 1.0, ahead / np.where(apart, apart, 1)).prod(2)
+        middle = self.turns[around[:, k // 2]]
+        steps = rotation.log(middle.swapaxes(2, 3)[:, None] @ self.turns[around])
+        return (middle @ rotation.exp(np.einsum("nk,nkja->nja", weight, steps)),
+                np.einsum("nk,nka->na", weight, self.places[around]))
+
+    def deviation(self, frames: np.ndarray, around: np.ndarray) -> np.ndarray:
+        """(n, J + 1, 3) turns in the axes of each joint's parent, rad, and shift, m, from those polynomials to the frames."""
+        turns, places = self.between(frames, around)
+        return np.concatenate([rotation.log(self.turns[frames] @ turns.swapaxes(2, 3)),
+                               (self.places[frames] - places)[:, None]], 1)

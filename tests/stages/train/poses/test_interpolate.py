@@ -54,12 +54,23 @@ def test_a_fit_that_was_left_as_it_is_stays(turn):
     assert max(off(*follow_neighbours(*fit, *fit, trained), *fit, range(FRAMES))) < 1e-9
 
 
+@pytest.mark.parametrize("t", [1, 38])
+def test_next_to_the_clips_end_one_neighbour_is_enough_on_that_side(turn, t):
+    pose, transl, trained = turn
+    trained[:] = True
+    trained[t] = False
+    fit, fit_transl = shaken(pose, transl, 0.05)
+    begun = np.where(trained[:, None, None], pose, fit), np.where(trained[:, None], transl, fit_transl)
+    assert max(off(*begun, pose, transl, [t])) > 0.05
+    assert max(off(*follow_neighbours(fit, fit_transl, *begun, trained), pose, transl, [t])) < 0.02
+
+
 def test_frames_without_near_neighbours_on_both_sides_stay_as_they_are(turn):
     pose, transl, trained = turn
     fit, fit_transl = shaken(pose, transl, 0.05)
     trained[[0, 1, 20, 21, 22, 23]] = False
-    trained[38] = False
-    for t in (0, 1, 20, 23, 38):
+    trained[39] = False
+    for t in (0, 1, 20, 23, 39):
         got, shift = follow_neighbours(fit, fit_transl, pose, transl, trained)
         np.testing.assert_array_equal(got[t], pose[t])
         np.testing.assert_array_equal(shift[t], transl[t])
