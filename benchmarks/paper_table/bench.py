@@ -26,11 +26,15 @@ HIDDEN = ("right_back", "left_front")
 
 def parser() -> argparse.ArgumentParser:
     out = argparse.ArgumentParser(prog="gsac bench paper-table", description=__doc__.splitlines()[0])
-    out.add_argument("--seeds", type=int, nargs="+", default=[41, 42], metavar="N", help="clips to render (default: 41 42)")
+    out.add_argument("--seeds", type=int, nargs="*", default=[41, 42], metavar="N", help="clips to render (default: 41 42)")
     out.add_argument("--frames", type=int, default=60, help="frames of a clip (default: 60)")
     out.add_argument("--recipe", default="fast", choices=["fast", "paper"], help="recipe of the trainings (default: fast)")
     out.add_argument("--device", default="cpu", choices=["cpu", "cuda"], help="where training runs (default: cpu)")
     out.add_argument("--repeats", type=int, default=5, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 5)")
+    out.add_argument("--fills", nargs="+", default=list(FILLS), choices=FILLS, help="rows of each clip (default: all)")
+    out.add_argument("--beside", type=Path, action="append", default=[], metavar="CSV",
+                     help="paper_table.csv of a part that ran on its own, told and written with these rows; may be repeated; with "
+                          "--seeds and no number after it nothing else is measured")
     out.add_argument("--steps", type=int, default=None, help="steps of a training (default: the recipe's)")
     out.add_argument("--height", type=int, default=None, help="px that are trained on (default: the frames' own)")
     out.add_argument("--out", type=Path, default=Path("bench-paper-table"), metavar="DIR", help="default: ./bench-paper-table")
@@ -44,12 +48,14 @@ def main(argv: list[str] | None = None) -> int:
 
     say = plain_journal()
     options.out.mkdir(parents=True, exist_ok=True)
-    rows: dict[tuple[str, str], list[dict]] = {}
+    beside = [table.read_csv(path) for path in options.beside]
+    rows: table.Rows = {}
     for at, seed in enumerate(options.seeds):
         hidden = HIDDEN[at % len(HIDDEN)]
         clip = render_clip(training.clip_folder(options.out, f"seed{seed}_{hidden}_{options.frames}"), say, seed=seed,
                            frames=options.frames, hidden_hand=hidden)
-        for fill, settings in FILLS.items():
+        for fill in options.fills:
+            settings = FILLS[fill]
             case = training.fit_clip(options.out, clip, fill.replace(" ", "_").replace("'", "") if settings else "", say, settings)
             if fill == GIVEN:
                 case = training.with_truth(case, clip, options.out)
@@ -60,6 +66,8 @@ def main(argv: list[str] | None = None) -> int:
                     seed=repeat))
                 table.write_csv(rows, options.out / "paper_table.csv")
             say.note(f"{clip.name}, {fill}: {table.cells(rows[clip.name, fill])}")
+    rows = table.join(*beside, rows, order=list(FILLS))
+    table.write_csv(rows, options.out / "paper_table.csv")
     words = table.text(rows)
     print(words)
     (options.out / "paper_table.txt").write_text(words + "\n")

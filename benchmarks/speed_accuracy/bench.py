@@ -11,28 +11,30 @@ import argparse
 from pathlib import Path
 
 from gsac.benchmarks import training
-from gsac.benchmarks.speed_accuracy.trial import PAPER, Trial
+from gsac.benchmarks.speed_accuracy.trial import PAPER, WAYS, Trial
 from gsac.pipeline.journal import Journal, plain_journal
 from gsac.pipeline.quality import QUALITIES, STANDARD
 
 CURVE = 6
-"""Judged checkpoints of a training with the first seed."""
+"""Judged checkpoints of a training with seed 0."""
 
 
 def parser() -> argparse.ArgumentParser:
     out = argparse.ArgumentParser(prog="gsac bench speed-accuracy", description=__doc__.splitlines()[0])
     training.declare(out, "speed-accuracy")
-    out.add_argument("--ways", nargs="+", default=[*QUALITIES, PAPER], choices=[*QUALITIES, PAPER],
+    out.add_argument("--ways", nargs="+", default=list(WAYS), choices=WAYS,
                      help="presets of --quality, or recipe paper (default: all)")
     out.add_argument("--device", default="cpu", choices=["cpu", "cuda"], help="where training runs (default: cpu)")
-    out.add_argument("--repeats", type=int, default=3, metavar="N", help="trainings of each, with seeds 0 to N-1 (default: 3)")
+    out.add_argument("--repeats", type=int, default=3, metavar="N", help="trainings of each, with as many seeds (default: 3)")
+    out.add_argument("--first", type=int, default=0, metavar="SEED", help="first of these seeds; only 0 has a curve (default: 0)")
     out.add_argument("--jobs", type=int, default=1, metavar="N",
                      help="trainings side by side, each on its share of the cores (default: 1)")
     out.add_argument("--novel", type=int, default=0, metavar="FRAMES",
                      help="also judge this many frames in novel poses against truth; rendered clips only (default: 0)")
     out.add_argument("--exact", action="store_true", help="also train rendered clips with their true poses")
     out.add_argument("--beside", type=Path, action="append", default=[], metavar="CSV",
-                     help="speed_accuracy.csv of another device or machine, told and drawn with these; may be repeated")
+                     help="speed_accuracy.csv of another device or machine, or of a part that ran on its own: told, drawn and "
+                          "written with these; may be repeated; with --seeds and no number after it nothing else is measured")
     return out
 
 
@@ -42,13 +44,13 @@ def main(argv: list[str] | None = None) -> int:
 
     say = plain_journal()
     options.out.mkdir(parents=True, exist_ok=True)
-    beside = [trial for path in options.beside for trial in table.read_csv(path)]
-    trials = measure(options, say)
+    beside = [table.read_csv(path) for path in options.beside]
+    trials = table.join(*beside, measure(options, say))
     table.write_csv(trials, options.out / "speed_accuracy.csv")
-    words = table.text(trials + beside)
+    words = table.text(trials)
     print(words)
     (options.out / "speed_accuracy.txt").write_text(words + "\n")
-    chart.draw(trials + beside, options.out)
+    chart.draw(trials, options.out)
     return 0
 
 
@@ -75,7 +77,7 @@ def measure(options: argparse.Namespace, say: Journal) -> list[Trial]:
         trials.append(trial)
         table.write_csv(trials, options.out / "speed_accuracy.csv")
 
-    calls = [(case, plain.name, way, seed) for seed in range(options.repeats) for way in options.ways
+    calls = [(case, plain.name, way, seed) for seed in range(options.first, options.first + options.repeats) for way in options.ways
              for case, plain in zip(cases[STANDARD if way == PAPER else way], next(iter(cases.values())), strict=True)]
     training.side_by_side(one, calls, options.jobs)
     names = [(clip, way) for way in options.ways for _, clip, its, _ in calls if its == way]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from gsac.benchmarks.speed_accuracy.trial import PAPER, Trial, seconds_to
+from gsac.benchmarks.speed_accuracy.trial import PAPER, WAYS, Trial, seconds_to
 from gsac.stages.contract import BadInput
 
 HEAD = ("clip", "device", "way", "seeds", "steps", "gaussians", "CPU s", "wall s", "psnr_fg", "+-", "aligned", "flip", "ssim",
@@ -65,6 +65,12 @@ def _mean_seconds(some: list[Trial]) -> float:
     """Over the trials whose time is known; NaN without any."""
     known = [t.seconds for t in some if t.seconds is not None]
     return float(np.mean(known)) if known else float("nan")
+
+
+def join(*sheets: list[Trial]) -> list[Trial]:
+    """The trials of several sheets by device, way, clip and seed; of one that is in several, that of the last."""
+    found = {(t.device, WAYS.index(t.way), t.clip, t.seed): t for sheet in sheets for t in sheet}
+    return [found[key] for key in sorted(found)]
 
 
 def write_csv(trials: list[Trial], path: Path) -> None:

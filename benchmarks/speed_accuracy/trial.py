@@ -6,12 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gsac.pipeline.quality import QUALITIES
 from gsac.stages.contract import BadInput
 
 NOVEL = ("psnr_novel", "psnr_novel_aligned", "flip_novel", "flip_novel_aligned", "stray_alpha", "needle_share")
 """Optional metrics of a training."""
 PAPER = "paper"
 """The way that trains by recipe paper; the others are presets of `--quality`."""
+WAYS = (*QUALITIES, PAPER)
 
 
 @dataclass

@@ -3,9 +3,10 @@
 import pytest
 
 from gsac.benchmarks.paper_table import table
-from gsac.benchmarks.paper_table.bench import FILLS, GIVEN, parser
+from gsac.benchmarks.paper_table.bench import FILLS, GIVEN, main, parser
 from gsac.pipeline.params import resolve
 from gsac.pipeline.project import Project
+from gsac.stages.contract import BadInput
 
 
 def metrics(psnr, lpips=None):
@@ -28,6 +29,20 @@ def test_the_sheet_has_a_row_for_each_repeat(tmp_path):
     table.write_csv({("a", "no fill"): [metrics(30.0), metrics(32.0)]}, tmp_path / "t.csv")
     lines = (tmp_path / "t.csv").read_text().splitlines()
     assert len(lines) == 3 and lines[2].startswith("a,no fill,1,40.0,12000,32.0")
+
+
+def test_rows_that_ran_on_their_own_come_together_as_one_sheet(tmp_path):
+    fills = {("b", "our fill"): [metrics(30.0)], ("a", "our fill"): [metrics(29.0), metrics(31.0, 0.05)]}
+    table.write_csv(fills, tmp_path / "1.csv")
+    table.write_csv({("a", GIVEN): [metrics(33.0)], ("b", "our fill"): [metrics(30.5)]}, tmp_path / "2.csv")
+    assert main(["--seeds", "--beside", str(tmp_path / "1.csv"), "--beside", str(tmp_path / "2.csv"), "--out", str(tmp_path)]) == 0
+    rows = table.read_csv(tmp_path / "paper_table.csv")
+    assert list(rows) == [("a", GIVEN), ("a", "our fill"), ("b", "our fill")]
+    assert [m["psnr_full_black"] for m in rows["a", "our fill"]] == [29.0, 31.0] and rows["a", "our fill"][0]["lpips_black"] is None
+    assert rows["b", "our fill"][0]["psnr_full_black"] == 30.5, "of a row that is in two parts, that of the last"
+    (tmp_path / "1.csv").write_text("clip,fill\na,our fill\n")
+    with pytest.raises(BadInput, match="1.csv.*n_gaussians"):
+        table.read_csv(tmp_path / "1.csv")
 
 
 def test_every_way_to_fill_is_a_setting_that_the_stage_takes():

@@ -16,7 +16,7 @@ from gsac.benchmarks.command import names
 from gsac.benchmarks.size import bench as size
 from gsac.benchmarks.size import chart as size_chart
 from gsac.benchmarks.speed_accuracy import chart, novel_poses, table
-from gsac.benchmarks.speed_accuracy.bench import parser, settings_before, train_values
+from gsac.benchmarks.speed_accuracy.bench import main, parser, settings_before, train_values
 from gsac.benchmarks.speed_accuracy.published import POINTS
 from gsac.benchmarks.speed_accuracy.trial import Trial, make_trial, seconds_to
 from gsac.pipeline.quality import QUALITIES
@@ -80,6 +80,21 @@ def test_trials_come_back_from_the_sheet_as_they_were_written(tmp_path):
     (tmp_path / "s.csv").write_text("clip,way\na,fine\n")
     with pytest.raises(BadInput, match="s.csv.*curve_seconds.*device"):
         table.read_csv(tmp_path / "s.csv")
+
+
+def test_parts_that_ran_on_their_own_come_together_as_one_sheet(tmp_path):
+    again = made("standard", [(5.0, 26.0)])
+    parts = [[made("paper", [(9.0, 22.0)], device="cuda"), PAPER], [made("standard", [(6.0, 26.1)], seed=1), FAST], [again]]
+    options = ["--seeds", "--out", str(tmp_path / "all")]
+    for at, trials in enumerate(parts):
+        table.write_csv(trials, tmp_path / f"{at}.csv")
+        options += ["--beside", str(tmp_path / f"{at}.csv")]
+    assert main(options) == 0
+    found = table.read_csv(tmp_path / "all" / "speed_accuracy.csv")
+    assert [(t.device, t.way, t.seed) for t in found] == [("cpu", "standard", 0), ("cpu", "standard", 1), ("cpu", "paper", 0),
+                                                          ("cuda", "paper", 0)]
+    assert found[0] == again, "a training that is in two parts counts once, as in the last"
+    assert (tmp_path / "all" / "speed_accuracy.png").stat().st_size > 5000
 
 
 def test_every_way_is_a_preset_or_the_papers_recipe_and_draft_keeps_its_fewer_frames():
