@@ -85,7 +85,10 @@ class Motion:
                 np.einsum("nk,nka->na", weight, self.places[around]))
 
     def deviation(self, frames: np.ndarray, around: np.ndarray) -> np.ndarray:
-        """(n, J + 1, 3) turns in the axes of each joint's parent, rad, and shift, m, from those polynomials to the frames."""
+        """(n, J + 1, 3) turns in the axes of each joint's parent, rad, and shift, m, from the polynomials to the frames.
+
+        frames: (n,); around: (n, k) frames that the polynomials go through.
+        """
         turns, places = self.between(frames, around)
         return np.concatenate([rotation.log(self.turns[frames] @ turns.swapaxes(2, 3)),
                                (self.places[frames] - places)[:, None]], 1)
