@@ -232,7 +232,7 @@ def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.n
 
 
 def meet_outlines(problem: Problem, state: State, sightings: Sightings) -> tuple[list[Pairs | None], np.ndarray]:
-    """`sample_outlines` of the body as it is."""
+    """`sample_outlines` of the body as it is: outline points of each frame, and the IoU (T,) of body and alpha."""
     params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
     return sample_outlines(problem.body, params, sightings.width, sightings.height, problem.seen.outlines)
 
