@@ -143,6 +143,12 @@ class ArmPaths:
         motion = sum(float(self.measure_motion(t, poses[t - 1], poses[t])) for t in range(1, len(poses)))
         return motion + sum(float(moved.weigh(t, pose[None])[0]) for t, pose in enumerate(poses))
 
+    def measure_apart(self, local: np.ndarray, frames: range) -> float:
+        """Cost of a hand that should rest on the body and lies apart from it. local: (F, J, 3, 3) joint rotations."""
+        poses = local[:, ARM_JOINTS[self.side, 1:]]
+        clear = np.array([self.around[t].measure_clearance(self.place(t, poses[t][None])[0, 3]) for t in frames])
+        return float(((np.maximum(clear - 2 * OFF, 0) / TOUCHES) ** 2).sum())
+
     def measure_motion(self, t: int, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Cost (...) of the motion from frame t - 1 to t. before, after: (..., 3, 3, 3) rotations."""
         angle = measure_turns(before[..., :2, :, :], after[..., :2, :, :])
@@ -168,7 +174,7 @@ class ArmPaths:
         points = np.where(np.isfinite(spread), (xy - np.nan_to_num(seen.xy[t, rows])) / spread, 0)
         spread = np.broadcast_to(seen.depth_spread, seen.depth.shape)[t, rows]
         depths = np.nan_to_num((x[:, 1:, 2] - self.hips[t] - seen.depth[t, rows]) / spread)
-        bends = (rotation.log(poses) - alone.mean[1:]) / alone.spread[t, 1:]
+        bends = (rotation.log(poses) - alone.mean[t, 1:]) / alone.spread[t, 1:]
         out = robust(points, ASTRAY)[0].sum((1, 2)) + robust(depths, ASTRAY)[0].sum(1) + (bends**2).sum((1, 2))
         if self.sure[t]:
             turns = measure_turns(poses[:, :2], self.state.local[t, ARM_JOINTS[self.side, 1:3]])

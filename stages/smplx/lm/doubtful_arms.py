@@ -143,11 +143,12 @@ def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: n
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     mirrored, calm = find_mirrored(arms, problem, state, missing)
-    state = unmirror(arms, problem, state, mirrored, calm, missing) if movable else state
+    loose = ~arms.mark_searched(len(missing))  # where a hand rests on the back was judged as paths are
+    state = unmirror(arms, problem, state, mirrored & loose, calm, missing) if movable else state
     doubtful = find_contradicted(arms, problem, state, missing) | find_untold(arms, problem, state, missing)
     if movable:
-        state = move(arms, problem, state, doubtful, missing)
-        state = move(arms, problem, state, with_stays(arms, mirrored), missing, BARE)
+        state = move(arms, problem, state, doubtful & loose, missing)
+        state = move(arms, problem, state, with_stays(arms, mirrored & loose), missing, BARE)
     return state, doubtful | mirrored
 
 

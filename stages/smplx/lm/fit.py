@@ -20,12 +20,13 @@ from gsac.avatar.yaw import yaw
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
-from gsac.stages.smplx.jacobians import Pairs, make_pairs, place_points
+from gsac.stages.smplx.jacobians import make_pairs, place_points
 from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, measure_uncovered, move, settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, widen_arm
 from gsac.stages.smplx.lm.hidden_search import search_hidden
 from gsac.stages.smplx.lm.observations import observe, subtract_habit
+from gsac.stages.smplx.lm.outline_points import meet_outlines
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
 from gsac.stages.smplx.lm.shake import transl_acceleration
@@ -34,9 +35,9 @@ from gsac.stages.smplx.lm.turn_jumps import find_jumps, find_turned_over
 from gsac.stages.smplx.lm.unseen_sway import find_unseen_sway
 from gsac.stages.smplx.prior import BODY_JOINTS, FINGER_JOINTS
 from gsac.stages.smplx.sightings import BODY_POINTS, HIPS, Sightings, focal_prior
-from gsac.stages.smplx.silhouette import Outline, sample_outlines
+from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.start.begin import begin
-from gsac.stages.smplx.state import Fit, State, to_params
+from gsac.stages.smplx.state import Fit, State
 
 FINGER_POINTS = np.array([i for hand in (LEFT_HAND, RIGHT_HAND) for i in range(hand.start, hand.stop)])
 SCALE_BONES = ((5, 11), (6, 12), (11, 13), (12, 14), (5, 7), (6, 8))
@@ -68,16 +69,17 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     if arms_told:
         state, moved = move_contradicted(hidden, problem, state, sightings.missing)
     if sightings.missing is not None and sightings.missing.any():
-        hidden.find(problem, state, sightings.missing, find_followed(problem, state, sightings))
-    if arms_told:
-        state = search_hidden(hidden, problem, state)
+        hidden.find(problem, state, sightings.missing, find_followed(problem, state))
+    problem.outline_weight = config.silhouette
+    if arms_told and hidden.stays:
+        state = search_hidden(hidden, problem, state, sightings.missing)
     iou = np.full(len(sightings.xy), np.nan)
-    problem.outline_weight, problem.limit, problem.seen.depth_spread = config.silhouette, ROBUST, ROUNDS_DEPTH_SPREAD
+    problem.limit, problem.seen.depth_spread = ROBUST, ROUNDS_DEPTH_SPREAD
     for r in range(config.rounds):
         progress(r, config.rounds + 1, "rounds")
         subtract_habit(problem.seen, sightings, detector, BODY_POINTS, state)
         if config.silhouette > 0:
-            iou = renew_outlines(problem, state, sightings)
+            problem.outline_pairs, iou = meet_outlines(problem, state)
         hidden.hold(problem, state)
         state.stance = problem.stance.learn(state.local[:, problem.active], state.stance)
         if problem.ground is None and config.contact > 0:
@@ -225,21 +227,9 @@ def measure_world_scale(problem: Problem, state: State, sightings: Sightings) ->
     return float(np.median(ratios)) if ratios else 1.0
 
 
-def renew_outlines(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
-    """Gives the problem new outline points, from the posed body. Returns the IoU (T,) of body and alpha, NaN without alpha."""
-    problem.outline_pairs, iou = meet_outlines(problem, state, sightings)
-    return iou
-
-
-def meet_outlines(problem: Problem, state: State, sightings: Sightings) -> tuple[list[Pairs | None], np.ndarray]:
-    """`sample_outlines` of the body as it is: outline points of each frame, and the IoU (T,) of body and alpha."""
-    params = to_params(problem.body, state, problem.seen.center, joint_offset=problem.person_offsets.joint_offset(state.own))
-    return sample_outlines(problem.body, params, sightings.width, sightings.height, problem.seen.outlines)
-
-
-def find_followed(problem: Problem, state: State, sightings: Sightings) -> np.ndarray:
+def find_followed(problem: Problem, state: State) -> np.ndarray:
     """(T,) bool, frames whose points and mask the body follows: others, after the person has left, say, tell of no hand."""
-    _, iou = meet_outlines(problem, state, sightings)
+    _, iou = meet_outlines(problem, state)
     known = iou[np.isfinite(iou)]
     far = iou < FOLLOWED * np.median(known) if len(known) else np.zeros(len(iou), bool)
     return np.isfinite(problem.seen.spread).any(1) & ~far

@@ -80,12 +80,12 @@ class Stay:
     last: int
     start: int
     stop: int
-    calm: bool = True
-    """Whether the arm mostly rests wherever its hand is seen."""
+    usual: np.ndarray | None = None
+    """(4, 3, 3) rotations of the arm, which mostly rests wherever its hand is seen; None where it does not."""
     rests: bool = True
     """Whether the arm rests while the hand is out of sight."""
-    place: int = 0
-    """Where the hand rests: -1 on the person's back, 1 on the belly; 0: anywhere behind the trunk as the camera sees it."""
+    on_back: bool = False
+    """Whether it rests on the person's back; else anywhere behind the trunk as the camera sees it."""
     wider: tuple[int, int] | None = None
     """First and last frame, exclusive, of the rest, where it began before the hand was lost or went on after; None: the stay's."""
 
@@ -156,7 +156,7 @@ class HiddenArms:
                 if hangs and against >= least:
                     problem.seen.spread[lost, WRIST[side]] = np.inf
                 elif told and not hangs:
-                    found.append(Stay(side, first, last, *find_around(seconds, first, last), usual is not None))
+                    found.append(Stay(side, first, last, *find_around(seconds, first, last), usual))
             if found and self.is_detected(state, chain, missing[:, side], side):
                 self.stays += found
 
@@ -227,7 +227,7 @@ class HiddenArms:
                 own = chain.frame(t)
                 wrist = own.place[0, ARM_JOINTS[stay.side, 3]] + state.transl[t]
                 near, far = self.measure_trunk(state, own, t, wrist)
-                away = stay.place * own.world[0, TRUNK_JOINTS[-1], 2, 2] if stay.place else 1.0
+                away = -own.world[0, TRUNK_JOINTS[-1], 2, 2] if stay.on_back else 1.0
                 depth = far + SKIN if away > 0 else near - SKIN
                 problem.seen.depth[t, WRIST[stay.side]] = depth - hips[t] if abs(away) > FACES and np.isfinite(depth) else np.nan
                 spread[t, WRIST[stay.side]] = BEHIND_SPREAD
@@ -258,6 +258,13 @@ class HiddenArms:
             out[slice(*stay.held), stay.side] = True
         return out
 
+    def mark_searched(self, frames: int) -> np.ndarray:
+        """(T, 2) bool, frames in which an arm rests on the back, or goes there from where it usually is. frames: T."""
+        out = np.zeros((frames, 2), bool)
+        for stay in self.stays:
+            out[stay.around, stay.side] |= stay.on_back
+        return out
+
 
 def find_usual(rotations: np.ndarray) -> np.ndarray | None:
     """(4, 3, 3) rotations of an arm that mostly rests; None where it does not. rotations: (N, 4, 3, 3) of the arm's joints."""
@@ -280,7 +287,7 @@ def isolate_arm(problem: Problem, stay: Stay) -> Problem:
     around, seen = stay.around, problem.seen
     assert seen.seconds is not None  # without times there are no stays
     cut = replace(seen, xy=seen.xy[around], spread=seen.spread[around], depth=seen.depth[around].copy(),
-                  depth_spread=np.broadcast_to(seen.depth_spread, seen.depth.shape)[around], seconds=seen.seconds[around],
+                  depth_spread=np.broadcast_to(seen.depth_spread, seen.depth.shape)[around].copy(), seconds=seen.seconds[around],
                   outlines=seen.outlines[around])
     alone = Problem(problem.body, problem.pairs, problem.hips, cut, ARM_JOINTS[stay.side], problem.smoothness,
                     problem.person_offsets)

@@ -1,52 +1,61 @@
-"""The search for an arm whose hand is out of sight: it goes as quickly as a gesture, or rests on the back or on the belly.
+"""The search for an arm whose hand is out of sight: it goes as quickly as a gesture, or rests on the back or elsewhere out of sight.
 
-A resting hand turns with the trunk. So, of an arm that mostly rests, its place is sought on either side of the trunk, and the rest
-lasts as long as the arm so found explains elbow and wrist, also in frames in which the hand is seen: one picture leaves open how
-deep a hand lies, pictures of one arm from several sides do not.
+A resting hand turns with the trunk, also in frames that show it: one picture leaves open how deep a hand lies, pictures of one arm
+from several sides do not. So an arm that mostly rests as usual is tried with its hand on the back from several moments on. Which
+search explains the pictures is judged as paths of doubtful arms are (arm_paths.py): by points, mask, what hides the hand and how
+much the arm moves.
 F frames; J joints; sides are 0 left, 1 right.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gsac.avatar import rotation
+from gsac.stages.smplx.lm.arm_paths import ArmPaths
 from gsac.stages.smplx.lm.hidden_arms import (
     ARM_JOINTS,
     ELBOW,
+    FAR_OFF,
     FREE,
     QUICK,
+    ROUGH_DEPTH,
     STEPS,
     STILL,
     WRIST,
     HiddenArms,
     Stay,
     bend_arm,
-    find_median,
     isolate_arm,
     isolate_state,
 )
-from gsac.stages.smplx.lm.problem import Problem
+from gsac.stages.smplx.lm.outline_points import meet_outlines
+from gsac.stages.smplx.lm.problem import ROBUST, Problem
 from gsac.stages.smplx.state import State
 
-BACK, BELLY = -1, 1
-HIDES = {BACK: ((52, 15, -85), (28, -71, 0)), BELLY: ((20, -12, -88), (16, -67, 0))}
-"""Place of a stay -> rotation vectors, degrees, of the left shoulder and elbow: hand on the small of the back, and on the belly."""
+ON_BACK, ON_BELLY = ((52, 15, -85), (28, -71, 0)), ((20, -12, -88), (16, -67, 0))
+"""Rotation vectors, degrees, of the left shoulder and elbow: hand on the small of the back, and on the belly."""
 GUESSED = 0.03
 """Spread, as a share of the person's height, that is added to elbow and wrist of a hidden hand: networks make them up."""
-TOLD = 0.05
-"""Share of the person's height from a resting arm's elbow and wrist to their points, at most, in frames that it explains."""
-TELLS = 4.0
-"""What each such frame counts against the cost, when one of two places is chosen."""
-RESTLESS = 1.25
-"""Factor on the cost of a search from which on resting costs too much: 1.18 at most with a hand on the back, 1.32 with one that
-talks."""
+NEAR_OFF = 2.0
+"""Factor on the robust limit once a search is near: hands that are taken for the other one must not drag the arm along."""
+OUTLINES = 2
+"""Rounds in which the arm meets the mask's outline, too."""
+STEP_S, GOES_S = 0.3, 0.6
+"""Seconds between moments at which a rest may begin or end, and that an arm takes to its place."""
+EARNS = 2.5
+"""By how much each frame of a longer rest must lower the cost: what an arm does in plain view its points tell."""
+USUAL = 0.15
+"""rad, spread of an arm that is as usual."""
 
 
-def search_hidden(arms: HiddenArms, problem: Problem, state: State) -> State:
-    """The state with the arms of all stays as they fit best; also loosens their motion and distrusts what was made up."""
+def search_hidden(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray) -> State:
+    """The state with the arms of all stays as they fit best; also loosens their motion and distrusts what was made up.
+
+    missing: (T, 2) bool, hands that were not detected.
+    """
     state = replace(state, local=state.local.copy())
     for stay in arms.stays:
         frames, arm = slice(stay.first, stay.last), ARM_JOINTS[stay.side]
@@ -54,61 +63,115 @@ def search_hidden(arms: HiddenArms, problem: Problem, state: State) -> State:
             problem.seen.spread[frames, point] = np.hypot(problem.seen.spread[frames, point], guessed * arms.height)
         problem.loose[stay.around, np.isin(problem.active, arm)] = QUICK
         problem.spread[stay.around, np.isin(problem.active, arm)] *= FREE
-        asis = state.local[stay.around]
-        ways = {place: list_ways(asis, stay, pose) for place, pose in HIDES.items()}
-        starts = [asis, *ways[BACK], *ways[BELLY]]
-        cost, local = fit_best(arms, problem, state, stay, starts, QUICK)
-        placed, least, resting = stay, np.inf, asis
-        if stay.calm:
-            tries = [rest(arms, problem, state, replace(stay, place=place), [asis, *own]) for place, own in ways.items()]
-            placed, least, resting = min(tries, key=lambda found: found[1] - TELLS * np.ptp(found[0].held))
-        if placed.place != BACK:  # before the belly a hand is detected wherever the camera sees it: it is behind the trunk
-            placed, (least, resting) = stay, fit_best(arms, problem, state, stay, starts, STILL)
-        stay.rests = bool(least < RESTLESS * cost)
-        if stay.rests:
-            stay.place, stay.wider, local = placed.place, placed.wider, resting
-        if stay.rests and stay.place == BACK:
-            start = resting.copy()
-            start[stay.held[0] - stay.start:stay.held[1] - stay.start, arm] = find_pose(resting, stay)
-            _, local = fit_best(arms, problem, state, stay, [start], STILL)
-        state.local[stay.around] = local
+        asis, shown = state.local[stay.around], ~missing[stay.around, stay.side].astype(bool)
+        alone = isolate_arm(problem, stay)
+        alone.seen.depth_spread[:, [ELBOW[stay.side], WRIST[stay.side]]] = ROUGH_DEPTH
+        judge = ArmPaths(alone, isolate_state(state, stay, asis), stay.side, shown, np.zeros_like(shown), arms.height)
+        starts = [asis, *(way for pose in (ON_BACK, ON_BELLY) for way in list_ways(asis, stay, pose))]
+        search = Search(arms, problem, state, judge)
+        found = [search.find(replace(stay, rests=rests), starts) for rests in (False, True)]
+        if stay.usual is not None:
+            found.append(rest_on_back(search, stay))
+        best = min(found, key=lambda each: each.cost)
+        stay.rests, stay.on_back, stay.wider = best.stay.rests, best.stay.on_back, best.stay.wider
+        state.local[stay.around] = best.local
     for stay in arms.stays:
         if stay.rests:
             problem.loose[stay.resting, np.isin(problem.active, ARM_JOINTS[stay.side])] = STILL
+        if stay.on_back:
+            expect_on_back(problem, stay)
     return state
 
 
-def rest(arms: HiddenArms, problem: Problem, state: State, stay: Stay, starts: list[np.ndarray]) -> tuple[Stay, float, np.ndarray]:
-    """The stay at its place, as long as its arm explains elbow and wrist; cost and joint rotations (F, J, 3, 3) of its frames.
+@dataclass(frozen=True)
+class Found:
+    """An arm as a search found it."""
 
-    starts: (F, J, 3, 3) joint rotations to search from.
-    """
-    cost, local = fit_best(arms, problem, state, stay, starts, STILL)
-    still, rows = replace(state, local=state.local.copy()), [ELBOW[stay.side], WRIST[stay.side]]
-    still.local[stay.around, ARM_JOINTS[stay.side]] = find_pose(local, stay)
-    uv = problem.project(still, problem.locate_points(problem.skeleton.pose(still.local, still.shape), still))[:, rows]
-    off = np.where(np.isfinite(problem.seen.spread[:, rows, None]), uv - np.nan_to_num(problem.seen.xy[:, rows]), 0)
-    told = np.linalg.norm(off, axis=-1).max(1) < TOLD * arms.height
-    first, last = stay.first, stay.last
-    while first > stay.start and told[first - 1]:
-        first -= 1
-    while last < stay.stop and told[last]:
-        last += 1
-    return replace(stay, wider=(first, last)), cost, local
+    stay: Stay
+    cost: float
+    local: np.ndarray
+    """(F, J, 3, 3) joint rotations of the stay's frames."""
 
 
-def find_pose(local: np.ndarray, stay: Stay) -> np.ndarray:
-    """(4, 3, 3) rotations of the stay's arm while its hand is out of sight. local: (F, J, 3, 3) of the stay's frames."""
-    return find_median(local[stay.first - stay.start:stay.last - stay.start, ARM_JOINTS[stay.side]])
+@dataclass(frozen=True)
+class Search:
+    """Searches in which only one arm moves."""
+
+    arms: HiddenArms
+    problem: Problem
+    state: State
+    judge: ArmPaths
+
+    def find(self, stay: Stay, starts: list[np.ndarray]) -> Found:
+        """The best from several starts, by the problem's own cost; the judge's is told. starts: (F, J, 3, 3) joint rotations."""
+        alone, hidden = isolate_arm(self.problem, stay), replace(self.arms, stays=[stay]).cut(stay)
+        own = stay.shift(stay.start, stay.stop - stay.start)
+        if stay.rests:
+            alone.loose[own.resting] = STILL
+        if stay.on_back:
+            expect_on_back(alone, own)
+            expect_usual(alone, own)
+
+        def bend(trial: State) -> State:
+            hidden.hold(alone, trial)
+            trial = bend_arm(alone, trial, STEPS)
+            hidden.hold(alone, trial)
+            return trial
+
+        tries = []
+        for start in starts:
+            trial = isolate_state(self.state, stay, start)
+            for off in (FAR_OFF, NEAR_OFF):
+                alone.limit = off * ROBUST
+                trial = bend(trial)
+            tries.append(trial)
+        best, alone.outline_weight = min(tries, key=alone.cost), self.problem.outline_weight
+        for _ in range(OUTLINES):
+            alone.outline_pairs, _ = meet_outlines(alone, best)
+            best = bend(best)
+        cost = self.judge.cost(best.local) + (self.judge.measure_apart(best.local, range(*own.held)) if stay.on_back else 0)
+        return Found(stay, cost, best.local)
+
+
+def rest_on_back(search: Search, stay: Stay) -> Found:
+    """The arm with its hand on the back, from and until when that costs least; before and after it is as usual."""
+    seconds, asis = search.problem.seen.seconds, search.state.local[stay.around]
+    assert seconds is not None  # without times there are no stays
+    step = max(1, round(STEP_S / float(np.median(np.diff(seconds)))))
+
+    def attempt(first: int, last: int) -> Found:
+        held = replace(stay, rests=True, on_back=True, wider=(first, last))
+        return search.find(held, list_ways(asis, held, ON_BACK)[:1])
+
+    def weigh(found: Found) -> float:
+        first, last = found.stay.held
+        return found.cost + EARNS * (last - first)
+
+    begun = min((attempt(first, stay.last) for first in range(stay.first, stay.start - 1, -step)), key=weigh)
+    return min([begun, *(attempt(begun.stay.held[0], last) for last in range(stay.last + step, stay.stop + 1, step))], key=weigh)
+
+
+def expect_on_back(problem: Problem, stay: Stay) -> None:
+    """Tells the pose prior that the stay's hand lies on the back."""
+    joints = [int(np.flatnonzero(problem.active == joint)[0]) for joint in ARM_JOINTS[stay.side, 1:3]]
+    problem.mean[slice(*stay.held), joints] = hiding_pose(stay.side, ON_BACK)
+
+
+def expect_usual(alone: Problem, stay: Stay) -> None:
+    """Tells the pose prior of an arm's own problem that the arm rests as usual before it goes to its place, and after."""
+    seconds, (first, last) = alone.seen.seconds, stay.held
+    assert seconds is not None and stay.usual is not None  # only an arm with a usual pose is tried on the back
+    away = (seconds < seconds[first] - GOES_S) | (seconds > seconds[last - 1] + GOES_S)
+    alone.mean[away], alone.spread[away], alone.loose[away] = rotation.log(stay.usual), USUAL, STILL
 
 
 def list_ways(asis: np.ndarray, stay: Stay, pose: tuple) -> list[np.ndarray]:
     """Joint rotations (F, J, 3, 3) to search from: the hiding pose with the way to it, and alone.
 
-    asis: (F, J, 3, 3) of the stay's frames; pose: one of `HIDES`.
+    asis: (F, J, 3, 3) of the stay's frames; pose: ON_BACK or ON_BELLY.
     """
-    frame, out = np.arange(stay.start, stay.stop), []
-    away = np.maximum(np.maximum(stay.first - frame, frame - stay.last + 1), 0)
+    frame, (first, last), out = np.arange(stay.start, stay.stop), stay.held, []
+    away = np.maximum(np.maximum(first - frame, frame - last + 1), 0)
     ramp = np.clip(1 - away / max(away.max(), 1), 0, 1)[:, None, None]
     joints, goal = ARM_JOINTS[stay.side, 1:3], hiding_pose(stay.side, pose)
     for share in (ramp, np.ones_like(ramp)):
@@ -119,24 +182,5 @@ def list_ways(asis: np.ndarray, stay: Stay, pose: tuple) -> list[np.ndarray]:
 
 
 def hiding_pose(side: int, pose: tuple) -> np.ndarray:
-    """Rotation vectors (2, 3) of shoulder and elbow of a side. pose: one of `HIDES`."""
+    """Rotation vectors (2, 3) of shoulder and elbow of a side. pose: ON_BACK or ON_BELLY."""
     return np.radians(np.array(pose, float)) * ([1, 1, 1] if side == 0 else [1, -1, -1])
-
-
-def fit_best(arms: HiddenArms, problem: Problem, state: State, stay: Stay, starts: list[np.ndarray],
-             speed: float) -> tuple[float, np.ndarray]:
-    """Lowest cost and joint rotations (F, J, 3, 3) of the stay's frames after searches in which only this arm moves.
-
-    starts: (F, J, 3, 3) joint rotations; speed: factor on the spreads of its motion while it rests.
-    """
-    alone = isolate_arm(problem, stay)
-    alone.loose[stay.shift(stay.start, stay.stop - stay.start).resting] = speed
-    found = []
-    for start in starts:
-        hidden, trial = replace(arms, stays=[stay]).cut(stay), isolate_state(state, stay, start)
-        for _ in range(2):
-            hidden.hold(alone, trial)
-            trial = bend_arm(alone, trial, STEPS)
-        hidden.hold(alone, trial)
-        found.append((alone.cost(trial), trial.local))
-    return min(found, key=lambda fit: fit[0])

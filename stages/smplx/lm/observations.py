@@ -37,6 +37,8 @@ class Observations:
     spread: np.ndarray  # (T, P) px; infinite where a point was not seen
     depth: np.ndarray  # (T, P) m, depth of the point against the hips; NaN where unknown
     depth_spread: float | np.ndarray  # m, or (T, P) m
+    size: tuple[int, int]
+    """px, width and height of the frames."""
     center: np.ndarray  # (2,) px
     seconds: np.ndarray | None  # (T,) time; None for photos
     focal_prior: tuple[float, float]
@@ -61,7 +63,7 @@ def observe(sightings: Sightings, detector: Detector, points: np.ndarray, center
     spread = np.hypot(usual, unsure) / np.sqrt(np.clip(sightings.score, 0.2, 1))
     spread = np.where(sightings.seen, spread, np.inf)[:, points]
     return Observations(sightings.xy[:, points].astype(np.float64), spread.astype(np.float64), _depths(sightings)[:, points],
-                        DEPTH_SPREAD, center, sightings.seconds, focal,
+                        DEPTH_SPREAD, (sightings.width, sightings.height), center, sightings.seconds, focal,
                         (config.height_m, GIVEN_HEIGHT_SPREAD) if config.height_m else ADULT_HEIGHT, 1.0, outlines,
                         OUTLINE_SPREAD * height)
 

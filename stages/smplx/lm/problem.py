@@ -44,7 +44,8 @@ class Problem:
         self.skeleton = Skeleton(body, active, person_offsets.joints if person_offsets else None)
         self.own_spread = person_offsets.spread if person_offsets else np.zeros(0)
         self.active = active
-        self.mean, spread = prior.pose_prior(active, body.hand_means)
+        mean, spread = prior.pose_prior(active, body.hand_means)
+        self.mean = np.tile(mean, (len(seen.xy), 1, 1))  # (T, A, 3)
         self.spread = np.tile(spread, (len(seen.xy), 1, 1))  # (T, A, 3)
         speed, acceleration = prior.motion_prior(active)
         self.speed_spread, self.acceleration_spread = speed, acceleration

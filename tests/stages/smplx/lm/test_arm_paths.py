@@ -15,7 +15,7 @@ from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm.arm_paths import BARE, THIN, ArmPaths, list_poses
 from gsac.stages.smplx.lm.fit import move_contradicted, set_up
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, HAND, WRIST, HiddenArms, Stay, isolate_arm
-from gsac.stages.smplx.lm.hidden_search import HIDES, hiding_pose
+from gsac.stages.smplx.lm.hidden_search import ON_BELLY, hiding_pose
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.prior import BODY_JOINTS
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
@@ -83,7 +83,7 @@ def arm_aside(body, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def hand_on_belly(body, tmp_path_factory):
-    return person_with(body, tmp_path_factory.mktemp("belly"), HIDES[1], np.pi + np.linspace(-0.4, 0.4, FRAMES))
+    return person_with(body, tmp_path_factory.mktemp("belly"), ON_BELLY, np.pi + np.linspace(-0.4, 0.4, FRAMES))
 
 
 def test_an_arm_that_hangs_in_the_fit_finds_its_way_to_the_hair(hand_in_hair):

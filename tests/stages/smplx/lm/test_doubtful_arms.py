@@ -18,7 +18,7 @@ from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, find_untold, settle_doubtful, with_stays
 from gsac.stages.smplx.lm.fit import fit_points, set_up
 from gsac.stages.smplx.lm.hidden_arms import HiddenArms, Stay, describe_arms, widen_arm
-from gsac.stages.smplx.lm.hidden_search import HIDES, hiding_pose
+from gsac.stages.smplx.lm.hidden_search import ON_BELLY, hiding_pose
 from gsac.stages.smplx.state import State
 from support.turning_person import height_of, outlines_of, sightings_of, turning_person
 
@@ -138,7 +138,7 @@ def hand_on_back(body, tmp_path_factory):
 def put_inside_trunk(truth: State) -> State:
     """The state with the hand of the frames on the back inside the trunk."""
     state = replace(truth, local=truth.local.copy())
-    for joint, turn in zip((16, 18), rotation.exp(hiding_pose(0, HIDES[1])), strict=True):
+    for joint, turn in zip((16, 18), rotation.exp(hiding_pose(0, ON_BELLY)), strict=True):
         state.local[ON_BACK, joint] = turn
     return state
 
