@@ -10,7 +10,8 @@ import io
 import json
 import math
 import struct
-from collections.abc import Callable, Mapping
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
@@ -225,10 +226,18 @@ def write_alpha(path: Path, alpha: np.ndarray) -> None:
 
 def write_arrays(path: Path, **arrays: np.ndarray) -> None:
     """Compressed npz, no pickle, byte-deterministic. arrays: (...) of any shape, by name."""
+    pack_arrays(path, arrays.items())
+
+
+def pack_arrays(path: Path, arrays: Iterable[tuple[str, np.ndarray]]) -> None:
+    """As `write_arrays`, of names and arrays (...): each is compressed as soon as it comes."""
     import numpy as np
 
     content = io.BytesIO()
-    np.savez_compressed(content, **arrays)  # pyright: ignore[reportArgumentType], the arrays have no such name
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, array in arrays:
+            with packed.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
     write_file(path, content.getvalue())
 
 

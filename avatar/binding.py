@@ -11,10 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike
-from scipy.spatial.transform import Rotation
 
+from gsac.avatar.nearest_rotation import nearest_quaternions
 from gsac.avatar.numba_kernel import kernel
-from gsac.avatar.rotation import to_wxyz
 from gsac.avatar.threads import Share, Workspace
 
 
@@ -81,9 +80,9 @@ def unbind(frames: FaceFrames, face: np.ndarray, bound: Bound) -> tuple[np.ndarr
     """The inverse of `bind`. face: (N,) int. Returns mu (N, 3), quat (N, 4) wxyz and log_scale (N, 3), float32."""
     R, T, k = frames.R[face], frames.T[face], np.maximum(frames.k[face, None], 1e-9)
     mu = np.einsum("nji,nj->ni", R, bound.means - T) / k
-    quat = to_wxyz(Rotation.from_matrix(np.einsum("nji,njk->nik", R, bound.rotations)).as_quat())
+    quat = nearest_quaternions(np.einsum("nji,njk->nik", R, bound.rotations))
     log_scale = np.log(np.maximum(bound.scales, 1e-9) / k)
-    return mu.astype(np.float32), np.ascontiguousarray(quat, np.float32), log_scale.astype(np.float32)
+    return mu.astype(np.float32), quat.astype(np.float32), log_scale.astype(np.float32)
 
 
 def bind_backward(vertices: np.ndarray, faces: np.ndarray, face: np.ndarray, mu: np.ndarray, quat: np.ndarray,

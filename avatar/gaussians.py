@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -52,18 +52,27 @@ class Gaussians:
         """Those that an index array (M,), mask (N,) or slice picks."""
         return replace(self, **{name: np.ascontiguousarray(getattr(self, name)[which]) for name in FIELDS})
 
-    def write(self, path: Path, coarser: Sequence[Gaussians] = ()) -> None:
-        """To avatar.npz, float32 and face int32, `low_pass`, and where given `light` and coarser levels of detail, finest first."""
-        arrays = self._arrays() | {"low_pass": np.array(self.low_pass, np.float64)}
+    def write(self, path: Path, coarser: Iterable[Gaussians] = ()) -> None:
+        """To avatar.npz, float32 and face int32, `low_pass`, and where given `light` and coarser levels of detail, finest first.
+
+        coarser: may still be in the making, its own arrays are compressed meanwhile.
+        """
+        artifacts.pack_arrays(path, self._members(coarser))
+
+    def _members(self, coarser: Iterable[Gaussians]) -> Iterator[tuple[str, np.ndarray]]:
+        """Names and arrays (...) of avatar.npz."""
+        yield from self._arrays().items()
+        yield "low_pass", np.array(self.low_pass, np.float64)
         if self.light is not None:
-            arrays["light"] = np.asarray(self.light, np.float32)
-        if coarser:
-            arrays["levels"] = np.array([len(level) for level in coarser], np.int32)
-            parts = [level._arrays() for level in coarser]
-            arrays |= {f"coarser_{name}": np.concatenate([part[name] for part in parts]) for name in FIELDS}
-            if all(level.max_height_px for level in coarser):
-                arrays["level_heights"] = np.array([level.max_height_px for level in coarser], np.float32)
-        artifacts.write_arrays(path, **arrays)
+            yield "light", np.asarray(self.light, np.float32)
+        levels = list(coarser)
+        if levels:
+            yield "levels", np.array([len(level) for level in levels], np.int32)
+            parts = [level._arrays() for level in levels]
+            for name in FIELDS:
+                yield f"coarser_{name}", np.concatenate([part[name] for part in parts])
+            if all(level.max_height_px for level in levels):
+                yield "level_heights", np.array([level.max_height_px for level in levels], np.float32)
 
     @classmethod
     def read(cls, path: Path) -> Gaussians:

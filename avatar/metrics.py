@@ -13,6 +13,7 @@ import numpy as np
 
 from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.flip_metric import flip
+from gsac.avatar.metric_kernels import lay_on_grey, likeness_of_windows, mean_square, pair_moments, slopes_in
 
 WHITE, BLACK = 1.0, 0.0
 BOXES = ("face", "left_hand", "right_hand")
@@ -46,13 +47,8 @@ VGG_HED = {"vgg_hed": Perceptual("vgg-hed", False, WHITE)}
 
 def composite(premultiplied: np.ndarray, alpha: np.ndarray, background: float) -> np.ndarray:
     """An image (H, W, 3) on a grey background, float64 in 0..1, rounded to 8 bit. premultiplied: (H, W, 3); alpha: (H, W)."""
-    image = premultiplied.astype(np.float64)
-    if background:
-        image += ((1 - alpha.astype(np.float64)) * background)[..., None]
-    np.clip(image, 0, 1, out=image)
-    image *= 255
-    np.rint(image, out=image)
-    image /= 255
+    image = np.empty(premultiplied.shape)
+    lay_on_grey(np.ascontiguousarray(premultiplied), np.ascontiguousarray(alpha), float(background), image)
     return image
 
 
@@ -74,17 +70,13 @@ def ssim(a: np.ndarray, b: np.ndarray, frame: tuple[int, int] | None = None) -> 
     if not a.size:
         return 1.0
 
-    def blur(x):
-        return cv2.GaussianBlur(x, (TAPS, TAPS), 1.5)[TAPS // 2:-(TAPS // 2), TAPS // 2:-(TAPS // 2)]
-
     # Variances of numbers about zero lose no digits in float32.
-    level_a, level_b = np.float32(a.mean()), np.float32(b.mean())
-    a, b = np.asarray(a, np.float32) - level_a, np.asarray(b, np.float32) - level_b
-    ma, mb = blur(a), blur(b)
-    variances, covariance = blur(a * a + b * b) - (ma * ma + mb * mb), blur(a * b) - ma * mb
-    ma, mb = ma + level_a, mb + level_b
-    c1, c2 = np.float32(0.01**2), np.float32(0.03**2)
-    alike = (2 * ma * mb + c1) * (2 * covariance + c2) / ((ma * ma + mb * mb + c1) * (variances + c2))
+    levels = np.float32(a.mean()), np.float32(b.mean())
+    moments = [np.empty(a.shape, np.float32) for _ in range(4)]
+    pair_moments(a, b, *levels, *moments)
+    means = [cv2.GaussianBlur(each, (TAPS, TAPS), 1.5) for each in moments]
+    alike = np.empty((max(a.shape[0] + 1 - TAPS, 0), max(a.shape[1] + 1 - TAPS, 0), a.shape[2]), np.float32)
+    likeness_of_windows(*means, *levels, np.float32(0.01**2), np.float32(0.03**2), TAPS // 2, alike)
     return float((alike.sum(dtype=np.float64) / 3 + total - alike.size / 3) / total)
 
 
@@ -93,10 +85,10 @@ def detail(image: np.ndarray, truth: np.ndarray, region: np.ndarray) -> float:
 
     image, truth: (H, W, 3); region: (H, W) bool. Central differences; NaN where the truth is flat.
     """
-    import cv2
+    slopes = np.empty((2, np.count_nonzero(region), 3), np.float32)
 
     def energy(values):
-        slopes = (cv2.Sobel(np.asarray(values, np.float32), cv2.CV_32F, across, 1 - across, ksize=1)[region] for across in (0, 1))
+        slopes_in(values, region, slopes)
         return sum(float(np.vdot(slope, slope)) for slope in slopes)
 
     own, true = energy(image), energy(truth)
@@ -115,9 +107,9 @@ def score(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np.ndarra
     """
     area = find_shown(alpha, mask)
     # Outside of the area both images are their background: the rest of the frame has no error, and a likeness of one.
-    cut_alpha, cut_mask = alpha[area], mask[area]
-    white, white_truth = composite(rgb[area], cut_alpha, WHITE), composite(truth[area], cut_mask, WHITE)
-    black, black_truth = composite(rgb[area], cut_alpha, BLACK), composite(truth[area], cut_mask, BLACK)
+    cut, cut_alpha, cut_truth, cut_mask = (np.ascontiguousarray(each[area]) for each in (rgb, alpha, truth, mask))
+    white, white_truth = composite(cut, cut_alpha, WHITE), composite(cut_truth, cut_mask, WHITE)
+    black, black_truth = composite(cut, cut_alpha, BLACK), composite(cut_truth, cut_mask, BLACK)
     error = np.zeros(mask.shape)
     error[area] = squared_error(white, white_truth)
     person = _score_person(white, white_truth, error[area], cut_alpha, cut_mask)
@@ -154,8 +146,9 @@ def score_person(rgb: np.ndarray, alpha: np.ndarray, truth: np.ndarray, mask: np
 
 def squared_error(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """(H, W), mean over the channels. image, truth: (H, W, 3)."""
-    difference = image - truth
-    return np.einsum("ijk,ijk->ij", difference, difference) / 3
+    error = np.empty(image.shape[:2])
+    mean_square(image, truth, error)
+    return error
 
 
 def _score_person(white: np.ndarray, white_truth: np.ndarray, error: np.ndarray, alpha: np.ndarray,

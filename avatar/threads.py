@@ -11,6 +11,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
@@ -103,6 +104,19 @@ def on_each(rooms: Sequence[Room], work: Callable[[Item, Room], Result], items: 
     finally:
         rest = [other.result() for other in others]
     return [first, *rest]
+
+
+@contextmanager
+def opencv_in_one_thread() -> Iterator[None]:
+    """OpenCV works in the thread that calls it: images are worked on side by side, and its own threads would spin beside ours."""
+    import cv2
+
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
 
 
 def _pool(name: str) -> ThreadPoolExecutor:

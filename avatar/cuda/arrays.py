@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike
@@ -65,7 +65,9 @@ class OnFaces(Protocol):
 class Arrays:
     """Buffers by name, and the `Scene` that tells the kernels their addresses and sizes."""
 
-    def __init__(self) -> None:
+    def __init__(self, stream: Any):
+        """stream: of the device that works with them."""
+        self.stream = stream
         self.buffers: dict[str, Buffer] = {}
         self.scene = Scene()
         self.scratch: list[str] = []
@@ -80,7 +82,7 @@ class Arrays:
         assert name in POINTERS
         if name in self.buffers:
             self.buffers[name].free()
-        self.buffers[name] = buffer = Buffer(shape, dtype)
+        self.buffers[name] = buffer = Buffer(shape, dtype, self.stream)
         setattr(self.scene, name, buffer.pointer)
         return buffer
 

@@ -1,9 +1,10 @@
-"""The few driver calls that the trainer needs: memory, launches, graphs, events. One context, one stream."""
+"""The few driver calls that the trainer needs: memory, launches, graphs, events. One context, and a stream for each trainer."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -34,10 +35,11 @@ def _call(name: str, *arguments: Any) -> Any:
 
 
 class Buffer:
-    """An array on the device."""
+    """An array on the device. Copies to and from it take their turn in a stream: they wait for no other one's work."""
 
-    def __init__(self, shape: Shape, dtype: DTypeLike):
-        self.shape, self.dtype = tuple(np.atleast_1d(shape)), np.dtype(dtype)
+    def __init__(self, shape: Shape, dtype: DTypeLike, stream: Any):
+        """stream: `Device.stream` of whoever works with it."""
+        self.shape, self.dtype, self.stream = tuple(np.atleast_1d(shape)), np.dtype(dtype), stream
         self.bytes = int(np.prod(self.shape, dtype=np.int64)) * self.dtype.itemsize
         self.pointer = int(_call("cuMemAlloc", max(self.bytes, 16)))
 
@@ -46,18 +48,20 @@ class Buffer:
         array = np.ascontiguousarray(array, self.dtype)
         if array.nbytes != self.bytes:
             raise ValueError(f"the buffer is {self.shape}, the array {array.shape}")
-        _call("cuMemcpyHtoD", self.pointer, array.ctypes.data, self.bytes)
+        _call("cuMemcpyHtoDAsync", self.pointer, array.ctypes.data, self.bytes, self.stream)
+        _call("cuStreamSynchronize", self.stream)
         return self
 
     def read(self) -> np.ndarray:
         """A copy (...) in the buffer's shape."""
         array = np.empty(self.shape, self.dtype)
-        _call("cuMemcpyDtoH", array.ctypes.data, self.pointer, self.bytes)
+        _call("cuMemcpyDtoHAsync", array.ctypes.data, self.pointer, self.bytes, self.stream)
+        _call("cuStreamSynchronize", self.stream)
         return array
 
     def fill(self, byte: int) -> Buffer:
         """Sets every byte."""
-        _call("cuMemsetD8", self.pointer, byte, self.bytes)
+        _call("cuMemsetD8Async", self.pointer, byte, self.bytes, self.stream)
         return self
 
     def free(self) -> None:
@@ -67,8 +71,15 @@ class Buffer:
             self.pointer = 0
 
 
+@lru_cache(maxsize=4)  # a fit opens eight devices
+def _functions(code: bytes, names: tuple[str, ...]) -> dict[str, Any]:
+    """Handles of machine code's kernels, by name."""
+    module = _call("cuModuleLoadData", code)
+    return {name: _call("cuModuleGetFunction", module, name.encode()) for name in names}
+
+
 class Device:
-    """The first GPU, its stream, and the kernels by name. Raises NoDeviceError where there is none."""
+    """The first GPU, a stream of its own, and the kernels by name. Raises NoDeviceError where there is none."""
 
     def __init__(self):
         if why := why_not():
@@ -86,12 +97,11 @@ class Device:
         self.architecture = f"sm_{major}{minor}"
         self.kernels: dict = {}
         self.load(cubin(self.architecture), KERNELS)
-        self.stream = _call("cuStreamCreate", driver.CUstream_flags.CU_STREAM_DEFAULT)
+        self.stream = _call("cuStreamCreate", driver.CUstream_flags.CU_STREAM_NON_BLOCKING)
 
     def load(self, code: bytes, names: Iterable[str]) -> None:
         """Adds kernels from machine code."""
-        module = _call("cuModuleLoadData", code)
-        self.kernels |= {name: _call("cuModuleGetFunction", module, name.encode()) for name in names}
+        self.kernels |= _functions(code, tuple(names))
 
     def launch(self, kernel: str, grid: tuple[int, int], threads: int, struct: ctypes.Structure) -> None:
         """Launches a kernel, which takes one struct by value."""

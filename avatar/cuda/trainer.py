@@ -37,7 +37,7 @@ class CudaTrainer:
         self.device = device or Device()
         self.recipe, self.body, self.face = recipe, body, np.asarray(gaussians.face, np.int32)
         self.frames, self.count, self.light, self.low_pass = len(levels[0]), len(gaussians), gaussians.light, gaussians.low_pass
-        self.arrays = Arrays()
+        self.arrays = Arrays(self.device.stream)
         self.buffers, self.scene = self.arrays.buffers, self.arrays.scene
         self._graph = None
         self.seconds = 0.0

@@ -11,6 +11,8 @@ from gsac.avatar.cuda.recipe import Recipe
 from gsac.avatar.cuda.smoothing import smoothing_series
 from gsac.avatar.cuda.structs import FRAME
 from gsac.avatar.joints import BODY, FINGERS, JAW, JAW_EYES
+from gsac.avatar.numba_kernel import own_kernel
+from gsac.avatar.threads import Workspace, side_by_side
 
 NOW = 256
 """Bytes kept for each frame of the batch's `Now`; at least the struct's."""
@@ -19,20 +21,41 @@ NOW = 256
 def upload_shots(arrays: Arrays, levels: list[list[Shot]], rest_of: np.ndarray) -> None:
     """Pixels and cameras of levels of T shots, and which of their tiles show the person. rest_of: (T,) as in BodyArrays."""
     frames = np.zeros(len(levels) * arrays.scene.frame_count, [(name, np.dtype(kind)) for name, kind in FRAME.items()])
-    pixels, flags = [], []
+    places = []
     at = tiles = 0
     for i, (t, shot) in enumerate((t, shot) for level in levels for t, shot in enumerate(level)):
         h, w = shot.pixels.shape[:2]
-        rows, columns = -(-h // TILE), -(-w // TILE)
-        shown = np.zeros((rows * TILE, columns * TILE), bool)
-        shown[:h, :w] = np.ascontiguousarray(shot.pixels).view(np.uint32)[..., 0] != 0
         frames[i] = (at, tiles, w, h, *shot.camera.focal, *shot.camera.center, rest_of[t], t, *shot.corner, 0)
-        pixels.append(shot.pixels.reshape(-1))
-        flags.append(shown.reshape(rows, TILE, columns, TILE).any((1, 3)).reshape(-1))
-        at, tiles = at + h * w, tiles + rows * columns
+        places.append((shot.pixels, at, tiles))
+        at, tiles = at + h * w, tiles + -(-h // TILE) * -(-w // TILE)
+    pixels, occupied = np.empty((at, 4), np.uint8), np.zeros(tiles, np.uint8)
+
+    def lay(place: tuple[np.ndarray, int, int], _: Workspace) -> None:
+        shot, at, tiles = place
+        own = pixels[at:at + shot.shape[0] * shot.shape[1]].reshape(shot.shape)
+        own[:] = shot
+        _mark_tiles(own.view(np.uint32)[..., 0], occupied[tiles:], TILE)
+
+    side_by_side(lay, places)
     arrays.upload("frames", frames.view(np.uint8), np.uint8)
-    arrays.upload("pixels", np.concatenate(pixels), np.uint8)
-    arrays.upload("occupied", np.concatenate(flags), np.uint8)
+    arrays.upload("pixels", pixels, np.uint8)
+    arrays.upload("occupied", occupied, np.uint8)
+
+
+@own_kernel(nogil=True)
+def _mark_tiles(pixels, occupied, tile):
+    """Sets the first of `occupied` to one where a tile, row by row, shows anything. pixels: (h, w), 0 where nothing is shown; tile:
+    px, its side.
+    """
+    height, width = pixels.shape
+    columns = -(-width // tile)
+    for y in range(height):
+        for column in range(columns):
+            found = np.uint32(0)
+            for x in range(tile * column, min(tile * (column + 1), width)):
+                found |= pixels[y, x]
+            if found:
+                occupied[y // tile * columns + column] = 1
 
 
 def upload_body(arrays: Arrays, body: BodyArrays, recipe: Recipe, pose: np.ndarray, transl: np.ndarray) -> None:

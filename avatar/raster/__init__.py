@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsac.avatar import binding, light
+from gsac.avatar import binding
 from gsac.avatar.camera import Camera
 from gsac.avatar.draw_rule import PIXEL, LowPass
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import backward, forward, project, tiles
+from gsac.avatar.raster.lit import shade_faces
 from gsac.avatar.threads import Workspace
 
 
@@ -178,7 +179,7 @@ def render_bound(vertices: np.ndarray, faces: np.ndarray, gaussians: Gaussians, 
                                 take("valid", (f,), np.bool_))
     bound = binding.Bound(take("means", (n, 3), real), take("rotations", (n, 3, 3), real), take("scales", (n, 3), real))
     binding.forward(workspace.share, vertices, faces, take("used", (f,), np.bool_), frames, face, mu, quat, log_scale, bound)
-    shade = None if gaussians.light is None else light.shade(gaussians.light, frames.R[face, :, 1] * light.FROM_CAMERA.astype(real))
+    shade = None if gaussians.light is None else shade_faces(gaussians.light, frames.R, face, workspace)
     rgb = gaussians.rgb if shade is None else gaussians.rgb * shade
     rendering = render(*bound, rgb, gaussians.opacity, camera, workspace, gaussians.low_pass)
     rendering.state.bound, rendering.state.shade = (vertices, faces, face, mu, quat, log_scale), shade

@@ -77,7 +77,7 @@ def nearest_milliseconds(trainer: PaperTrainer) -> float:
 
 def copy_bandwidth(device: Device, size: int = 1 << 30) -> float:
     """Bytes a second, read and written, of a large copy on the device."""
-    a, b = Buffer(size, np.uint8).fill(1), Buffer(size, np.uint8)
+    a, b = Buffer(size, np.uint8, device.stream).fill(1), Buffer(size, np.uint8, device.stream)
     begin, end, times = device.event(), device.event(), []
     for _ in range(12):
         device.mark(begin)
@@ -112,7 +112,7 @@ def float_rate(device: Device, turns: int = 4096) -> float:
     """float32 operations a second of independent multiply-adds, two operations each."""
     device.load(compile_source(SPIN, device.architecture), ["spin"])
     blocks = device.processors * 16
-    out = Buffer(blocks * 256, np.float32)
+    out = Buffer(blocks * 256, np.float32, device.stream)
     begin, end, times = device.event(), device.event(), []
     for _ in range(12):
         device.mark(begin)

@@ -14,6 +14,7 @@ from gsac.stages.train.fast.cuda import Cuda
 from gsac.stages.train.fast.finish import Finish
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.finite import named_values, require_finite
+from gsac.stages.train.gaussians.coarser import Coarser
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.task import Fit, Task
@@ -29,12 +30,13 @@ def fit_fast(backend: Backend, task: Task) -> Fit:
     fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, budget(task, backend.device))
     require_finite("after the last step", named_values(fit.gaussians))
     with_drift = replace(task, poses=task.poses.copy())
-    aside = ThreadPoolExecutor(2)
+    aside, coarser = ThreadPoolExecutor(2), Coarser()
     finish = aside.submit(Finish, task.poses, task.trained)
-    coarser = aside.submit(lod.fit_levels, with_drift, backend, fit, lambda level: finish.result()(level))
+    levels = aside.submit(lod.fit_levels, with_drift, backend, fit, lambda level: finish.result()(level), coarser.add)
+    levels.add_done_callback(lambda done: coarser.end(done.exception()))
     aside.shutdown(wait=False)
     if backend.device == "cpu" or task.network:  # torch records its graph alone
-        wait([coarser])
+        wait([levels])
     return replace(fit, gaussians=finish.result()(fit.gaussians), coarser=coarser)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +25,7 @@ from gsac.avatar.freed_memory import hand_back
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips
 from gsac.avatar.metrics import figures, mean_psnr, summary
+from gsac.avatar.threads import opencv_in_one_thread
 from gsac.avatar.vgg_hed import VggHed
 from gsac.avatar.yaw import turn_seen
 from gsac.stages.body_choice import load_body
@@ -67,6 +68,7 @@ JUDGING = 4, "parts of judging"
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # small matrices, and the same sums whoever else is at work
+@opencv_in_one_thread()
 def run(job: Job) -> None:
     """The whole stage: job.inputs to job.out."""
     config = job.config
@@ -114,11 +116,11 @@ def run(job: Job) -> None:
 
     run = Run(job, Poses(body, params), camera, views, trained, held, choosing, turn)
     run.fit()
+    area = run.write()
     if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
         job.warn(Finding.of(Code.PART_UNSEEN, parts=", ".join(parts)))
-    if run.seen_area < LEAST_SEEN:
-        job.warn(Finding.of(Code.LITTLE_SEEN, figure=run.seen_area))
-    run.write()
+    if area < LEAST_SEEN:
+        job.warn(Finding.of(Code.LITTLE_SEEN, figure=area))
 
 
 def warm(device: str) -> None:
@@ -212,20 +214,12 @@ class Run:
         self.result = RECIPES[config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
         require_finite("after the last step", named_result(self.result.gaussians, self.poses))
-        self.seen_area = seen_area(self.poses, self.trained, self.views)
-        self.result.coarser.add_done_callback(self.free_views)
 
-    def free_views(self, _: Future[list[Gaussians]]) -> None:
-        """Gives back the memory of the views, which no level needs any more: judging takes as much again."""
-        self.views.clear()
-        hand_back()
-
-    def coarser(self) -> list[Gaussians]:
-        """The coarser levels, once they are fitted."""
-        levels = self.result.coarser.result()
-        for level in levels:
+    def coarser(self) -> Iterator[Gaussians]:
+        """The coarser levels, each once it is fitted."""
+        for level in self.result.coarser:
             require_finite("after the last step", named_values(level))
-        return levels
+            yield level
 
     def clock(self) -> np.ndarray:
         """(2,) s, wall and CPU time of training, including that before a stop, without judging."""
@@ -299,21 +293,41 @@ class Run:
         converge(gaussians, poses, self.held, self.filmed, LAST_ROUNDS)
         return judge(gaussians, poses, self.held, self.filmed, None, self.job.config.flip, self.networks), small_rows
 
-    def write(self) -> None:
-        """Writes the stage's outputs."""
+    def write(self) -> float:
+        """Writes the stage's outputs; returns the share of the body's surface in view."""
         job, gaussians = self.job, self.result.gaussians
         folder = job.out / "heldout"
         folder.mkdir()
         job.progress(0, *JUDGING)
-        poses = self.poses_of_all()
-        poses.to_params().write(job.out / "body.npz")
-        write_frame(folder / "views.png", draw_all_round(gaussians, poses))
-        with ThreadPoolExecutor(1) as aside:
-            writing = aside.submit(lambda: gaussians.write(job.out / "avatar.npz", self.coarser()))
-            figures = json.dumps(self.metrics(gaussians, poses, folder), indent=1) + "\n"
+        with ThreadPoolExecutor(2) as aside:
+            seeing = aside.submit(seen_area, self.poses, self.trained, self.views)
+            poses = self.poses_of_all()
+            drawing = aside.submit(self.write_poses, poses, folder / "views.png")
+            writing = aside.submit(self.write_avatar, seeing)
+            figures = json.dumps(self.metrics(gaussians, poses, folder, seeing), indent=1) + "\n"
+            drawing.result()
             writing.result()
         write_file(job.out / "metrics.json", figures.encode())
         self.tell_timings()
+        return seeing.result()
+
+    def write_poses(self, poses: Poses, picture: Path) -> None:
+        """Writes the poses, and a picture of the avatar from all round."""
+        poses.to_params().write(self.job.out / "body.npz")
+        write_frame(picture, draw_all_round(self.result.gaussians, poses))
+
+    def write_avatar(self, seeing: Future[float]) -> None:
+        """Writes the gaussians with their levels, and once these are there, gives back the memory of the views, which nobody needs
+        any more: judging takes as much again. seeing: looks at the views, too.
+        """
+
+        def levels() -> Iterator[Gaussians]:
+            yield from self.coarser()
+            seeing.result()
+            self.views.clear()
+            hand_back()
+
+        self.result.gaussians.write(self.job.out / "avatar.npz", levels())
 
     def tell_timings(self) -> None:
         """Tells the engine how long training took, and where it went on from, which a run of equal inputs would not repeat."""
@@ -322,13 +336,13 @@ class Run:
                             ("curve", [{key: row[key] for key in TIMES if key in row} for row in self.curve])):
             self.job.timing(name, value)
 
-    def metrics(self, gaussians: Gaussians, poses: Poses, folder: Path) -> dict:
-        """The content of metrics.json. folder: where the images of the held-out frames go."""
+    def metrics(self, gaussians: Gaussians, poses: Poses, folder: Path, seeing: Future[float]) -> dict:
+        """The content of metrics.json. folder: where the images of held-out frames go; seeing: the share of the surface in view."""
         config, held = self.job.config, self.held
         small = {t: view.reduced(SMALL) for t, view in self.filmed.items()}
         trained = self.trained_camera
         aligned, ttpo, small_ttpo = poses.copy(), [], []
-        with ThreadPoolExecutor(1) as aside:  # a GPU is this thread's alone
+        with ThreadPoolExecutor(1 if self.job.device == "cpu" else 2) as aside:  # a GPU is this thread's alone
             judging = aside.submit(self.judge_both, gaussians, poses, small, folder)
             comparing = aside.submit(self.judge_fit_and_trained, gaussians, poses)
             bending = aside.submit(judge_novel, gaussians, poses)
@@ -369,7 +383,7 @@ class Run:
             "lpips_in_loss": self.in_loss == NETWORKS[0], **({"vgg_hed_in_loss": True} if self.in_loss == VGG_HED else {}),
             "levels": looking.result(),
             "likeness": likeness,
-            "seen_area": self.seen_area, "turn_degrees": self.turn,
+            "seen_area": seeing.result(), "turn_degrees": self.turn,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **bending.result(),
             "curve": [{key: value for key, value in row.items() if key not in TIMES} for row in self.curve],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +12,7 @@ from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.config import TrainConfig
+from gsac.stages.train.gaussians.coarser import Coarser
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
@@ -61,12 +61,5 @@ class Fit:
     """The recipe's own entries of metrics.json."""
     smaller: list[Fit] = field(default_factory=list)
     """Smaller sizes that were tried and not taken, the largest of them first."""
-    coarser: Future[list[Gaussians]] = field(default_factory=lambda: settled([]))
-    """Coarser levels of detail, the finest of them first. They may still be in the making, from the task's views."""
-
-
-def settled(levels: list[Gaussians]) -> Future[list[Gaussians]]:
-    """Levels that are there already."""
-    future: Future[list[Gaussians]] = Future()
-    future.set_result(levels)
-    return future
+    coarser: Coarser = field(default_factory=Coarser.none)
+    """They may still be in the making, from the task's views."""

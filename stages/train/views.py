@@ -12,6 +12,7 @@ import numpy as np
 
 from gsac.avatar.artifacts import frame_paths, read_alpha, read_frame
 from gsac.avatar.camera import Camera
+from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import available_cores, side_by_side
 from gsac.stages.contract import StageError
 from gsac.stages.missing_frames import pair_masks
@@ -137,7 +138,8 @@ def _read_view(path: Path, mask: Path | None, camera: Camera, height: int | None
     w = max(1, round(rgb.shape[1] * h / rgb.shape[0]))
     if (w, h) == (rgb.shape[1], rgb.shape[0]):
         pixels, area = np.zeros((h, w, 4), np.uint8), _shown(alpha)
-        pixels[area] = _to_bytes(_cut_out(rgb[area], alpha[area], mixed))
+        cut, cut_alpha = np.ascontiguousarray(rgb[area]), np.ascontiguousarray(alpha[area])
+        pixels[area] = cut_out_bytes(cut if mixed else unmix(cut, cut_alpha), cut_alpha)
     else:
         pixels = _to_bytes(cv2.resize(_cut_out(rgb, alpha, mixed), (w, h), interpolation=cv2.INTER_AREA))
     return View(camera.scaled(w, h), pixels, (0, 0)), float(alpha.mean())
@@ -153,6 +155,19 @@ def _shown(alpha: np.ndarray) -> tuple[slice, slice]:
 def _cut_out(rgb: np.ndarray, alpha: np.ndarray, mixed: bool) -> np.ndarray:
     """(H, W, 4) float32 in 0..255, premultiplied RGB and mask. rgb: (H, W, 3) uint8; alpha: (H, W)."""
     return np.dstack([(rgb if mixed else unmix(rgb, alpha)) * alpha[..., None], alpha * 255])
+
+
+@own_kernel(nogil=True)
+def cut_out_bytes(rgb, alpha):
+    """(h, w, 4) uint8, as `_cut_out`. rgb: (h, w, 3) uint8; alpha: (h, w) float32 in 0..1."""
+    height, width = alpha.shape
+    pixels = np.empty((height, width, 4), np.uint8)
+    for y in range(height):
+        for x in range(width):
+            for c in range(3):
+                pixels[y, x, c] = np.uint8(np.rint(np.float32(rgb[y, x, c]) * alpha[y, x]))
+            pixels[y, x, 3] = np.uint8(np.rint(alpha[y, x] * np.float32(255)))
+    return pixels
 
 
 def _to_bytes(pixels: np.ndarray) -> np.ndarray:

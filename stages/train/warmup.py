@@ -13,7 +13,7 @@ from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.recipes import BACKENDS, RECIPES
 from gsac.stages.train.task import Task
-from gsac.stages.train.views import View
+from gsac.stages.train.views import View, cut_out_bytes
 
 FRAMES, STEPS, GAUSSIANS = 3, 6, 330
 WIDTH, HEIGHT, FOCAL, DISTANCE = 54, 96, 150.0, 3.2
@@ -30,7 +30,7 @@ def warm_up() -> None:
         pose[t, 0] = np.pi * np.array([np.cos(t * TURN / 2), 0, np.sin(t * TURN / 2)])
     params = BodyParams.from_pose(pose, np.tile([0.0, 0.0, DISTANCE], (FRAMES, 1)), np.zeros(4),
                                   np.zeros((FRAMES, body.exprdirs.shape[2])), FOCAL, (WIDTH / 2, HEIGHT / 2), model=body.digest)
-    pixels = np.full((HEIGHT, WIDTH, 4), 255, np.uint8)
+    pixels = cut_out_bytes(np.full((HEIGHT, WIDTH, 3), 255, np.uint8), np.ones((HEIGHT, WIDTH), np.float32))
     views = [View(Camera((FOCAL, FOCAL), (WIDTH / 2, HEIGHT / 2), WIDTH, HEIGHT), pixels, (0, 0)) for _ in range(FRAMES)]
     frames, poses = np.arange(FRAMES), Poses(body, params)
     config = TrainConfig(gaussians=GAUSSIANS, steps=STEPS, pose_rounds=1)

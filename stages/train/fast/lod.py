@@ -5,15 +5,17 @@ From afar many gaussians share a pixel, and then fewer that were fitted to small
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
+from gsac.avatar.threads import prefetch
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.drawn_height import find_drawn_height, typical_height
 from gsac.stages.train.fast.initial_gaussians import crop_views
@@ -47,27 +49,26 @@ FRAMES = 6
 """Frames that are looked at, at most, to find up to which height a level is drawn."""
 
 
-def fit_levels(task: Task, backend: Backend, fit: Fit, finish: Callable[[Gaussians], Gaussians]) -> list[Gaussians]:
+def fit_levels(task: Task, backend: Backend, fit: Fit, finish: Callable[[Gaussians], Gaussians],
+               hand_out: Callable[[Gaussians], None]) -> None:
     """Levels below fit.gaussians, the finest of them first; none of `LEVELS` that has as many gaussians as the one before it.
 
-    finish: a level as it is handed out, from the gaussians as they were fitted.
+    finish: a level as it is handed out, from the gaussians as they were fitted; hand_out: called with each when it is done.
     """
     rest, body = task.poses.rest(int(task.trained[0]))[0], task.poses.body
     filmed = crop_views(task)
     tall = typical_height(task.poses, filmed)
-    poses, looked_at = find_frames(task, filmed)
-    coarse = scale_views(looked_at, MOVED / tall)
-    finished: list[Future[Gaussians]] = []
-    heights: list[Future[float]] = []
-    finer, finer_seen, placed = fit.gaussians, fit.seen, None
+    finer, finer_seen = fit.gaussians, fit.seen
     smaller = [(tried.gaussians, tried.seen) for tried in fit.smaller]
-    with ThreadPoolExecutor(1) as aside:  # a level is looked at and finished while the next one is fitted
-        for level in LEVELS:
-            if len(finer) <= level.most:
-                continue
-            placed = placed or aside.submit(move, finer, task, poses, coarse)
-            scale, size = min(1.0, level.height / tall), min(level.most, round(FEWER * len(finer)))
-            views = scale_views(filmed, scale)
+    levels = [level for level in LEVELS if level.most < len(finer)]
+    scales = [min(1.0, level.height / tall) for level in levels]
+    told: list[Future[float]] = []
+    # a level is looked at and finished while the next one is fitted, whose images are made ready while this one is
+    with ThreadPoolExecutor(2) as aside, ThreadPoolExecutor(1) as ahead:
+        looked_at = aside.submit(find_frames, task, filmed, tall)
+        finer_placed = aside.submit(move, finer, task, looked_at)
+        for level, scale, views in zip(levels, scales, prefetch(ahead, partial(scale_views, filmed), scales, 1), strict=True):
+            size = min(level.most, round(FEWER * len(finer)))
             tried, seen = min((one for one in ((finer, finer_seen), *smaller) if len(one[0]) >= size), key=lambda one: len(one[0]))
             worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
             fewer, seen = merge_to_size(tried, seen, worth, size, body, rest)
@@ -75,18 +76,44 @@ def fit_levels(task: Task, backend: Backend, fit: Fit, finish: Callable[[Gaussia
             trainer.seen = seen
             pace = FIRM if len(tried) >= 2 * size else GENTLE
             gaussians, seen = backend.refit(task, trainer, views, pace).finish(views)
-            finer_placed, placed = placed, aside.submit(move, gaussians, task, poses, coarse)
-            heights.append(aside.submit(look, gaussians, placed, finer, finer_placed, scale_views(looked_at, scale)))
-            finished.append(aside.submit(finish, gaussians))
-            finer, finer_seen = gaussians, seen
-    least = np.minimum.accumulate([height.result() for height in heights])
-    return [replace(level.result(), max_height_px=float(height)) for level, height in zip(finished, least, strict=True)]
+            placed, finished = aside.submit(move, gaussians, task, looked_at), aside.submit(finish, gaussians)
+            told.append(aside.submit(tell, Placed(gaussians, placed), Placed(finer, finer_placed), looked_at, scale, finished,
+                                     told[-1] if told else None, hand_out))
+            finer, finer_seen, finer_placed = gaussians, seen, placed
+    for each in told:
+        each.result()
 
 
-def look(level: Gaussians, poses: Future[Poses], finer: Gaussians, finer_poses: Future[Poses], views: dict[int, View]) -> float:
-    """`find_drawn_height` of a level, each with its own poses in the same views."""
-    return find_drawn_height(Candidate(level, poses.result(), list(views), views),
-                             Candidate(finer, finer_poses.result(), list(views), views))
+class LookedAt(NamedTuple):
+    """Some frames to look at."""
+
+    poses: Poses
+    """Of all frames."""
+    views: dict[int, View]
+    """Frame -> its view, as large as those that are trained on."""
+    small: dict[int, View]
+    """The same with a person of `MOVED` px."""
+
+
+class Placed(NamedTuple):
+    """A level, and its own poses in the frames that are looked at."""
+
+    gaussians: Gaussians
+    poses: Future[Poses]
+
+
+def tell(level: Placed, finer: Placed, looked_at: Future[LookedAt], scale: float, finished: Future[Gaussians],
+         before: Future[float] | None, hand_out: Callable[[Gaussians], None]) -> float:
+    """Hands out a level with its height, px, up to which it is drawn: `find_drawn_height`, at most that of the level before.
+
+    scale: size of the views that it was fitted to, of those looked at; finished: the level as it is handed out.
+    """
+    views = scale_views(looked_at.result().views, scale)
+    height = find_drawn_height(*(Candidate(one.gaussians, one.poses.result(), list(views), views) for one in (level, finer)))
+    if before is not None:
+        height = min(height, before.result())
+    hand_out(replace(finished.result(), max_height_px=height))
+    return height
 
 
 def scale_views(views: Mapping[int, View], scale: float) -> dict[int, View]:
@@ -94,24 +121,26 @@ def scale_views(views: Mapping[int, View], scale: float) -> dict[int, View]:
     return of_each(lambda view: view.scaled(scale), views)
 
 
-def find_frames(task: Task, views: dict[int, View]) -> tuple[Poses, dict[int, View]]:
-    """Some frames to look at and all poses: as large as those that are trained on, and not trained on where such are at hand.
+def find_frames(task: Task, views: dict[int, View], tall: float) -> LookedAt:
+    """Some frames to look at: frames that are not trained on where such are at hand.
 
     In frames that were trained on, the finest level is flattered by all that it knows of these very frames.
-    views: trained frame -> view.
+    views: trained frame -> view; tall: px, the person's height in them.
     """
     poses = task.poses
     if task.filmed:
         height, poses = task.views[int(task.trained[0])].frame.height, carry_to_untrained(task.poses, task.trained)
         views = {int(t): task.filmed[int(t)].reduced(height) for t in task.choosing}
-    return poses, dict(list(views.items())[::-(-len(views) // FRAMES)])
+    some = dict(list(views.items())[::-(-len(views) // FRAMES)])
+    return LookedAt(poses, some, scale_views(some, MOVED / tall))
 
 
-def move(gaussians: Gaussians, task: Task, poses: Poses, views: dict[int, View]) -> Poses:
-    """The poses, those of untrained frames moved to their views by these gaussians.
+def move(gaussians: Gaussians, task: Task, looked_at: Future[LookedAt]) -> Poses:
+    """The poses, those of untrained frames that are looked at moved to their views by these gaussians.
 
     With poses that the finer level moved, a level would also pay for lying elsewhere than that one, which nobody sees.
     """
+    poses, _, views = looked_at.result()
     if not task.filmed:
         return poses
     poses = poses.copy()
@@ -119,21 +148,22 @@ def move(gaussians: Gaussians, task: Task, poses: Poses, views: dict[int, View])
     return poses
 
 
-def judge_levels(finest: Gaussians, levels: list[Gaussians], poses: Poses, views: Mapping[int, View]) -> list[dict]:
+def judge_levels(finest: Gaussians, levels: Iterable[Gaussians], poses: Poses, views: Mapping[int, View]) -> list[dict]:
     """Held-out psnr_fg and ssim of each level where the person is as tall as it is drawn at most, with its size and the same
     figures of the finest level.
 
-    views: held-out frame -> its whole view, as large as the trained ones.
+    levels: each is judged as soon as it comes; views: held-out frame -> its whole view, as large as the trained ones.
     """
     tall = typical_height(poses, views) if views else np.nan
-    rows, candidates = [], []
+    rows = []
     for level in levels:
         assert level.max_height_px is not None  # as `fit_levels` makes them
         small = scale_views(views, level.max_height_px / tall)
         height = next((view.camera.height for view in small.values()), None)
-        rows.append({"n_gaussians": len(level), "max_height_px": level.max_height_px, "image_height": height})
-        candidates += [Candidate(gaussians, poses, list(small), small) for gaussians in (level, finest)]
-    for k, judged_rows in enumerate(judge_all(candidates)):
-        figures, name = summary(judged_rows), "_finest" if k % 2 else ""
-        rows[k // 2] |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}
+        row = {"n_gaussians": len(level), "max_height_px": level.max_height_px, "image_height": height}
+        judged = judge_all([Candidate(gaussians, poses, list(small), small) for gaussians in (level, finest)])
+        for judged_rows, name in zip(judged, ("", "_finest"), strict=True):
+            figures = summary(judged_rows)
+            row |= {f"{key}{name}": figures[key] for key in ("psnr_fg", "ssim")}
+        rows.append(row)
     return rows

@@ -1,4 +1,4 @@
-"""Nearest neighbours among places, on all of the kernels' threads."""
+"""Nearest neighbours among places."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from scipy.spatial import KDTree
 
 from gsac.avatar.threads import kernel_threads
 
+MANY = 10000
+"""Queries from which on several threads are worth it: each call starts them anew, which takes long beside busy ones."""
+
 
 def find_nearest(places: np.ndarray, queries: np.ndarray, count: int) -> np.ndarray:
     """(M, K) indices of the places (N, 3) nearest to each of queries (M, 3), nearest first; K is `count`, at most N."""
     most = min(count, len(places))
-    return KDTree(places).query(queries, k=most, workers=kernel_threads())[1].reshape(len(queries), most)
+    threads = kernel_threads() if len(queries) >= MANY else 1
+    return KDTree(places).query(queries, k=most, workers=threads)[1].reshape(len(queries), most)

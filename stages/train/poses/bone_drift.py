@@ -7,6 +7,8 @@ their gaussians and joints, until the fit's angles show the person where the ref
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +20,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
 from gsac.avatar.mesh import vertex_normals
 from gsac.avatar.skinning import joint_transforms, skin
+from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.poses.poses import Poses
 
 BONES = BODY.stop
@@ -92,13 +95,10 @@ def find_drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.n
     for _ in range(ROUNDS):
         hessian, gradient = known.copy(), known @ np.append(rotation.log(turns).ravel(), np.zeros(3))
         arms = np.einsum("jab,njb->nja", turns, levers)
-        for t, place in enumerate(sum_over_bones(fit, arms) + start[:, None]):
-            z = place[:, 2]
-            for axis in range(2):
-                image = place[:, axis] / z
-                rows = slopes(fit[t, :, axis] - image[:, None, None] * fit[t, :, 2], arms) / z[:, None]
-                hessian += rows.T @ (rows * facing[t, :, None])
-                gradient += rows.T @ ((image - goal[t, :, axis]) * facing[t])
+        places = sum_over_bones(fit, arms) + start[:, None]
+        for more, slope in chain(*side_by_side(partial(image_equations, fit, arms, places, goal, facing), range(len(frames)))):
+            hessian += more
+            gradient += slope
         move = np.linalg.solve(hessian, -gradient)
         turns = rotation.exp(move[:-3].reshape(BONES, 3)) @ turns
         start = start + np.einsum("tab,b->ta", fit[:, 0], move[-3:])
@@ -107,6 +107,21 @@ def find_drift(poses: Poses, trained: np.ndarray, rest: np.ndarray, joints: np.n
     for joint in range(BONES, len(joints)):
         turns = np.concatenate([turns, turns[None, body.parents[joint]]])
     return turns
+
+
+def image_equations(fit: np.ndarray, arms: np.ndarray, places: np.ndarray, goal: np.ndarray, facing: np.ndarray, t: int,
+                    _: Workspace) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Hessian (U, U) and gradient (U,) of half the weighted squares by which a frame's points miss, along each axis of its image.
+
+    fit: (T, BONES, 3, 3) rotations; arms: (n, BONES, 3) m at rest; places: (T, n, 3) m, camera frame; goal: (T, n, 2) in focal
+    lengths; facing: (T, n) weights; t: the frame's number among them.
+    """
+    z, both = places[t, :, 2], []
+    for axis in range(2):
+        image = places[t, :, axis] / z
+        rows = slopes(fit[t, :, axis] - image[:, None, None] * fit[t, :, 2], arms) / z[:, None]
+        both.append((rows.T @ (rows * facing[t, :, None]), rows.T @ ((image - goal[t, :, axis]) * facing[t])))
+    return both
 
 
 def sum_over_bones(turns: np.ndarray, levers: np.ndarray) -> np.ndarray:

@@ -16,10 +16,10 @@ from gsac.stages.train.paper import densify
 
 
 class FakeDriver:
-    """Memory by address and the kernels launched, by name; a wait does all steps that were asked for."""
+    """Memory by address and the kernels launched, by name; a wait does all steps that were asked for and launched."""
 
     def __init__(self):
-        self.memory, self.launched, self.scene = {}, [], None
+        self.memory, self.launched, self.scene, self.waiting = {}, [], None, False
 
     def call(self, name, *arguments):
         if act := getattr(self, name, None):
@@ -34,15 +34,15 @@ class FakeDriver:
     def cuMemFree(self, pointer):  # noqa: N802
         del self.memory[pointer]
 
-    def cuMemcpyHtoD(self, pointer, source, size):  # noqa: N802
+    def cuMemcpyHtoDAsync(self, pointer, source, size, stream):  # noqa: N802
         assert size <= len(self.memory[pointer])
         ctypes.memmove(pointer, source, size)
 
-    def cuMemcpyDtoH(self, target, pointer, size):  # noqa: N802
+    def cuMemcpyDtoHAsync(self, target, pointer, size, stream):  # noqa: N802
         assert size <= len(self.memory[pointer])
         ctypes.memmove(target, pointer, size)
 
-    def cuMemsetD8(self, pointer, byte, size):  # noqa: N802
+    def cuMemsetD8Async(self, pointer, byte, size, stream):  # noqa: N802
         assert size <= len(self.memory[pointer])
         ctypes.memset(pointer, byte, size)
 
@@ -53,9 +53,16 @@ class FakeDriver:
         struct = ctypes.cast(rest[8], ctypes.POINTER(ctypes.c_void_p))[0]
         self.scene = structs.Scene.from_buffer_copy(ctypes.string_at(struct, ctypes.sizeof(structs.Scene)))
         self.launched.append(kernel)
+        self.waiting = True
         assert all(getattr(self.scene, name) in {*self.memory, None, 0} for name in structs.POINTERS), "kernels get live memory"
 
+    def cuGraphLaunch(self, graph, stream):  # noqa: N802
+        self.waiting = True
+
     def cuStreamSynchronize(self, stream):  # noqa: N802
+        if not self.waiting:
+            return
+        self.waiting = False
         state = structs.State.from_address(self.scene.state)
         state.step = state.stop
 

@@ -33,6 +33,10 @@ def person(body, rest):
     return gaussians, patterned
 
 
+def all_skin(body):
+    return merge.skin_weights(np.arange(len(body.faces)), body)
+
+
 def alpha(gaussians, rest, body):
     camera = Camera((150.0, 150.0), (48.0, 48.0), 96, 96)
     placed = (rest - (rest.min(0) + rest.max(0)) / 2) * [1, -1, -1] + [0, 0, 3.2]
@@ -72,7 +76,7 @@ def test_a_merged_gaussian_lies_where_the_one_that_shows_more_lay(person, rest, 
     frames = face_frames(rest, body.faces)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     shown = np.ones(COUNT)
-    pair = merge.find_cheapest_pairs(gaussians, bound, shown, frames.R[gaussians.face, :, 1], body)[:1]
+    pair = merge.find_cheapest_pairs(gaussians, bound, shown, frames, all_skin(body), 1)
     shown[pair[0, 0]] = 9
     _, fewer, _ = merge.merge_pairs(gaussians, bound, shown, pair, frames)
     places = bind(frames, fewer.face, fewer.mu, fewer.quat, fewer.log_scale).means
@@ -84,10 +88,26 @@ def test_fingers_are_not_merged_with_each_other(rest, body):
     gaussians = Gaussians.area(rest, body.faces, 12000)
     frames = face_frames(rest, body.faces)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    i, j = merge.find_cheapest_pairs(gaussians, bound, np.ones(len(gaussians)), frames.R[gaussians.face, :, 1], body).T
+    i, j = merge.find_cheapest_pairs(gaussians, bound, np.ones(len(gaussians)), frames, all_skin(body), len(gaussians)).T
     part = merge.skin_weights(gaussians.face, body)
     finger = np.zeros((len(gaussians), 10))
     for f in range(10):
         finger[:, f] = part[:, 25 + 3 * f:28 + 3 * f].sum(1)
     sure = (finger.max(1)[i] > 0.9) & (finger.max(1)[j] > 0.9)
     assert sure.sum() > 100 and (finger.argmax(1)[i] == finger.argmax(1)[j])[sure].all()
+
+
+def test_the_cheapest_pairs_are_the_same_however_few_are_asked_for(person, rest, body):
+    gaussians, _ = person
+    frames = face_frames(rest, body.faces)
+    bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    shown = np.random.default_rng(1).random(COUNT) + 0.1
+    every, few = (merge.find_cheapest_pairs(gaussians, bound, shown, frames, all_skin(body), most) for most in (COUNT, 40))
+    assert len(few) == 40 < len(every) < COUNT / 2 and len(np.unique(every)) == every.size
+    np.testing.assert_array_equal(few, every[:40])
+
+
+def test_gaussians_at_one_place_are_merged_with_each_other_not_with_themselves(rest, body):
+    gaussians = Gaussians.area(rest, body.faces, COUNT)[np.repeat(np.arange(300), 5)]
+    fewer, _ = merge.merge_to_size(gaussians, np.ones(COUNT, bool), np.ones(COUNT), 1000, body, rest)
+    assert len(fewer) == 1000 and len(np.unique(fewer.face)) == len(np.unique(gaussians.face))
