@@ -68,11 +68,10 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     moved = np.zeros((len(sightings.xy), 2), bool)
     if arms_told:
         state, moved = move_contradicted(hidden, problem, state, sightings.missing)
+    problem.outline_weight = config.silhouette
     if sightings.missing is not None and sightings.missing.any():
         hidden.find(problem, state, sightings.missing, find_followed(problem, state))
-    problem.outline_weight = config.silhouette
-    if arms_told and hidden.stays:
-        state = search_hidden(hidden, problem, state, sightings.missing)
+        state = search_hidden(hidden, problem, state, sightings.missing) if arms_told else state
     iou = np.full(len(sightings.xy), np.nan)
     problem.limit, problem.seen.depth_spread = ROBUST, ROUNDS_DEPTH_SPREAD
     for r in range(config.rounds):

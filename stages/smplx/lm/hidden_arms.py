@@ -287,7 +287,7 @@ def isolate_arm(problem: Problem, stay: Stay) -> Problem:
     around, seen = stay.around, problem.seen
     assert seen.seconds is not None  # without times there are no stays
     cut = replace(seen, xy=seen.xy[around], spread=seen.spread[around], depth=seen.depth[around].copy(),
-                  depth_spread=np.broadcast_to(seen.depth_spread, seen.depth.shape)[around].copy(), seconds=seen.seconds[around],
+                  depth_spread=np.broadcast_to(seen.depth_spread, seen.depth.shape)[around], seconds=seen.seconds[around],
                   outlines=seen.outlines[around])
     alone = Problem(problem.body, problem.pairs, problem.hips, cut, ARM_JOINTS[stay.side], problem.smoothness,
                     problem.person_offsets)

@@ -1,4 +1,4 @@
-"""The search for an arm whose hand is out of sight: it goes as quickly as a gesture, or rests on the back or elsewhere out of sight.
+"""The search for an arm whose hand is out of sight: it goes as quickly as a gesture, or rests, on the back or elsewhere hidden.
 
 A resting hand turns with the trunk, also in frames that show it: one picture leaves open how deep a hand lies, pictures of one arm
 from several sides do not. So an arm that mostly rests as usual is tried with its hand on the back from several moments on. Which
@@ -65,6 +65,7 @@ def search_hidden(arms: HiddenArms, problem: Problem, state: State, missing: np.
         problem.spread[stay.around, np.isin(problem.active, arm)] *= FREE
         asis, shown = state.local[stay.around], ~missing[stay.around, stay.side].astype(bool)
         alone = isolate_arm(problem, stay)
+        alone.seen.depth_spread = np.broadcast_to(alone.seen.depth_spread, alone.seen.depth.shape).copy()
         alone.seen.depth_spread[:, [ELBOW[stay.side], WRIST[stay.side]]] = ROUGH_DEPTH
         judge = ArmPaths(alone, isolate_state(state, stay, asis), stay.side, shown, np.zeros_like(shown), arms.height)
         starts = [asis, *(way for pose in (ON_BACK, ON_BELLY) for way in list_ways(asis, stay, pose))]
