@@ -139,6 +139,13 @@ def test_a_hand_inside_the_trunk_costs_more_than_one_on_it(hand_on_belly):
         assert within > on + 20
 
 
+def test_a_hand_that_should_rest_on_the_body_costs_more_the_farther_it_lies_from_it(hand_on_belly):
+    arms, problem, truth = hand_on_belly
+    paths = paths_of(arms, problem, truth, ~ALL)
+    on, beside = (paths.measure_apart(state.local, range(BENT[0], BENT[-1] + 1)) for state in (truth, hang(truth)))
+    assert beside > 4 * len(BENT) > on
+
+
 def test_an_arm_at_rest_costs_nothing_and_a_gesture_no_more_however_quick(hand_in_hair):
     arms, problem, truth = hand_in_hair
     paths = paths_of(arms, problem, truth, ALL)
