@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gsac.avatar import artifacts, light, raster
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.raster.lit import shade_faces
+from gsac.avatar.threads import Workspace
 
 LAMP = np.array([[0.8, 0.8, 0.9], [0.3, 0.2, 0.3], [-0.1, -0.1, 0.0], [-0.2, -0.3, -0.2]])
 
@@ -63,3 +66,10 @@ def test_a_file_with_a_wrong_light_is_refused_by_name(triangle, tmp_path, wrong,
     gaussians.write(tmp_path / "avatar.npz")
     with pytest.raises(artifacts.ArtifactError, match=word):
         Gaussians.read(tmp_path / "avatar.npz")
+
+
+def test_faces_are_lit_as_their_normals_are():
+    R = Rotation.random(50, random_state=2).as_matrix().astype(np.float32)
+    face = np.random.default_rng(3).integers(0, 50, 200)
+    lit = light.shade(LAMP, R[face, :, 1] * light.FROM_CAMERA)
+    np.testing.assert_array_equal(shade_faces(LAMP, R, face, Workspace()), lit)

@@ -115,18 +115,18 @@ class Search:
 
         def bend(trial: State) -> State:
             hidden.hold(alone, trial)
-            trial = bend_arm(alone, trial, STEPS)
-            hidden.hold(alone, trial)
-            return trial
+            return bend_arm(alone, trial, STEPS)
 
-        tries = []
+        best, least = self.state, np.inf
         for start in starts:
             trial = isolate_state(self.state, stay, start)
             for off in (FAR_OFF, NEAR_OFF):
                 alone.limit = off * ROBUST
                 trial = bend(trial)
-            tries.append(trial)
-        best, alone.outline_weight = min(tries, key=alone.cost), self.problem.outline_weight
+            hidden.hold(alone, trial)
+            if (cost := alone.cost(trial)) < least:
+                best, least = trial, cost
+        alone.outline_weight = self.problem.outline_weight
         for _ in range(OUTLINES):
             alone.outline_pairs, _ = meet_outlines(alone, best)
             best = bend(best)
