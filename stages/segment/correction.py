@@ -1,7 +1,7 @@
 """Corrects the outline at full size by a plate: opens gaps that show the bare scene, adds rims that cannot be scene.
 
 GrabCut works at half size and with the colours of the whole person, so it fills the gaps between fingers, arm and trunk, and
-loses what is as bright as the wall.
+loses what is as bright as the wall. Clothes that look like the scene are told from gaps by the bones, which gaps lie beside.
 """
 
 from __future__ import annotations
@@ -29,6 +29,13 @@ LEAST_GAP = 6
 """Fewest pixels of a gap."""
 CAMOUFLAGE = 0.03
 """Share of the person that may look like the plate; with more it is the clothing, and only gaps open to the outside count."""
+ON_BONE, BESIDE = 0.012, 0.04
+"""Shares of the picture's height: what looks like the scene and comes so near to a bone is clothing, and so is what lies so near to
+clothing."""
+LIKELY, MOSTLY = 0.8, 0.3
+"""Network probability above which a pixel is likely the person's, and the least share of such pixels in clothing."""
+SPECK = 1e-4
+"""Share of the person: smaller parts on a bone do not tell of clothing beside them."""
 LEAST_KNOWN, MOST_CHANGED = 0.05, 0.08
 """Least share of known background, and the most of it that may be no scene; else the plate does not show the frame's scene."""
 
@@ -48,9 +55,11 @@ def match_scene(image: np.ndarray, outline: np.ndarray, plate: Plate) -> Plate |
     return Plate(expose(plate.image, gain), plate.known) if changed.mean() <= MOST_CHANGED else None
 
 
-def correct(image: np.ndarray, outline: np.ndarray, scene: Plate) -> np.ndarray:
-    """image: (H, W, 3) uint8; outline: (H, W) bool; scene: the plate in the frame's exposure. Returns the outline, (H, W) bool."""
-    return open_gaps(image, scene, add_rims(image, scene, outline))
+def correct(image: np.ndarray, outline: np.ndarray, scene: Plate, bones: np.ndarray,
+            likely: np.ndarray) -> np.ndarray:
+    """image: (H, W, 3) uint8; outline: (H, W) bool; scene: the plate in the frame's exposure; bones: (H, W) px, from the bones;
+    likely: (H, W) bool, where the probability is above `LIKELY`. Returns the outline, (H, W) bool."""
+    return open_gaps(image, scene, add_rims(image, scene, outline), bones, likely)
 
 
 def add_rims(image: np.ndarray, scene: Plate, outline: np.ndarray) -> np.ndarray:
@@ -62,8 +71,11 @@ def add_rims(image: np.ndarray, scene: Plate, outline: np.ndarray) -> np.ndarray
     return outline | (keep_squares(grown) > 0)
 
 
-def open_gaps(image: np.ndarray, scene: Plate, outline: np.ndarray) -> np.ndarray:
-    """The outline, (H, W) bool, without what looks like the bare scene. image: (H, W, 3) uint8."""
+def open_gaps(image: np.ndarray, scene: Plate, outline: np.ndarray, bones: np.ndarray, likely: np.ndarray) -> np.ndarray:
+    """The outline, (H, W) bool, without what looks like the bare scene and is no clothing.
+
+    image: (H, W, 3) uint8; bones: (H, W) px; likely: (H, W) bool.
+    """
     red, green, blue = cv2.split(cv2.absdiff(*(cv2.GaussianBlur(x, (0, 0), SMOOTH) for x in (image, scene.image))))
     away = cv2.max(cv2.max(red, green), blue)
     noise = np.median(away[::SOME, ::SOME][(scene.known & ~outline)[::SOME, ::SOME]])
@@ -75,7 +87,32 @@ def open_gaps(image: np.ndarray, scene: Plate, outline: np.ndarray) -> np.ndarra
     if area[gap].sum() > CAMOUFLAGE * np.count_nonzero(outline):
         outside = cv2.dilate((~outline).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         gap &= np.isin(np.arange(len(gap)), labels[outside])
-    return outline & ~gap[labels.astype(np.intp)]
+    labels = labels.astype(np.intp)
+    gap &= ~find_clothing(labels, gap, bones, likely, SPECK * np.count_nonzero(outline))
+    return outline & ~gap[labels]
+
+
+def find_clothing(labels: np.ndarray, gap: np.ndarray, bones: np.ndarray, likely: np.ndarray, speck: float) -> np.ndarray:
+    """(K,) bool, the parts that likely are the person's and lie on a bone, or beside such a part of more than `speck` px.
+
+    labels: (H, W), 0 to K - 1; gap: (K,) bool, the parts to look at; bones: (H, W) px; likely: (H, W) bool.
+    """
+    at = np.nonzero(gap[labels])
+    part = labels[at]
+    size, count = np.bincount(part, minlength=len(gap)), np.bincount(part, likely[at], len(gap))
+
+    def nearest(distance: np.ndarray) -> np.ndarray:
+        """(K,) px, of each part. distance: (H, W) px."""
+        least = np.full(len(gap), np.inf)
+        np.minimum.at(least, part, distance[at])
+        return least
+
+    ours = count > MOSTLY * size
+    clothing = ours & (nearest(bones) < ON_BONE * len(labels))
+    if (telling := clothing & (size > speck)).any():
+        apart = cv2.distanceTransform((~telling[labels]).astype(np.uint8), cv2.DIST_L2, 5)
+        clothing |= ours & (nearest(apart) < BESIDE * len(labels))
+    return clothing
 
 
 def keep_squares(mask: np.ndarray) -> np.ndarray:

@@ -21,10 +21,11 @@ from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
 from gsac.stages.missing_frames import read_keypoints
 from gsac.stages.person_seen import find_seen
+from gsac.stages.segment.bones import distance_to_bones
 from gsac.stages.segment.brought import MASKS, hand_on, refuse_inverted
 from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
-from gsac.stages.segment.correction import correct, match_scene
+from gsac.stages.segment.correction import LIKELY, correct, match_scene
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.matting import BAND, soften
 from gsac.stages.segment.network import PersonMask, PoseMask, SelfieMask, person_region
@@ -53,6 +54,12 @@ class Cutout(NamedTuple):
     """(h, w) bool."""
     image: np.ndarray
     """(h, w, 3) uint8, that part of the frame."""
+    xy: np.ndarray
+    """(133, 2) px from the part's corner."""
+    score: np.ndarray
+    """(133,)."""
+    likely: np.ndarray
+    """(h, w) bool, where the network is sure enough for clothes that look like the scene."""
     soft: np.ndarray | None = None
     """(h, w) half in 0..1, the alpha of a network whose edge is soft already."""
 
@@ -230,7 +237,7 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
     """
     box = around(probability)
     if box is None:
-        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0]), True
+        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0], xy, score, np.zeros((0, 0), bool)), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     corner = np.array(box[:2])
     here = None
@@ -239,8 +246,9 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
         here = compare(image[y0:y1, x0:x1], half_of(plate, (x0, y0, x1, y1)), probability[y0:y1, x0:x1])
     if here is not None:
         here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
-    outline = cut_out(image[part], probability[part], xy - corner, score, iterations, here)
-    return Cutout(box, keep_person(outline, xy - corner, score) > 0.5, image[part].copy()), plate is None or here is not None
+    xy = xy - corner
+    outline = keep_person(cut_out(image[part], probability[part], xy, score, iterations, here), xy, score) > 0.5
+    return Cutout(box, outline, image[part].copy(), xy, score, probability[part] > LIKELY), plate is None or here is not None
 
 
 def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: np.ndarray,
@@ -252,13 +260,14 @@ def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: 
     kept = keep_soft_person(alpha, xy, score)
     box = around(kept)
     if box is None:
-        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0]), True
+        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0], xy, score, np.zeros((0, 0), bool)), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     fits = True
     if plate is not None:
         x0, y0, x1, y1 = wide = around(kept, margin=WIDE) or box
         fits = compare(image[y0:y1, x0:x1], half_of(plate, wide), kept[y0:y1, x0:x1]) is not None
-    return Cutout(box, kept[part] > 0.5, image[part].copy(), kept[part].astype(np.float16)), fits
+    soft = kept[part]
+    return Cutout(box, soft > 0.5, image[part].copy(), xy - box[:2], score, soft > LIKELY, soft.astype(np.float16)), fits
 
 
 def keep_labels(labels: np.ndarray, cutout: Cutout) -> np.ndarray:
@@ -283,7 +292,8 @@ def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.nd
     part = cutout.image
     scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
     if scene is not None:
-        outline = correct(part, outline, scene)
+        bones = distance_to_bones(outline.shape, cutout.xy, cutout.score)
+        outline = correct(part, outline, scene, bones, cutout.likely)
     alpha[y0:y1, x0:x1] = soften(part, outline.astype(np.float32), scene) if cutout.soft is None else cutout.soft
     if cutout.soft is not None and scene is not None:
         near = cv2.dilate((outline != cutout.outline).astype(np.uint8), np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)) > 0

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.artifacts import write_frame
+from gsac.stages.segment.bones import distance_to_bones
 from gsac.stages.segment.correction import correct, match_scene
 from gsac.stages.segment.matting import soften
 from gsac.stages.segment.plate import Plate
@@ -12,6 +13,7 @@ from gsac.stages.segment.plate_from_video import relearn_plate
 
 SIZE = HEIGHT, WIDTH = 240, 160
 PERSON = 60, 40, 130
+NO_BONES = np.full(SIZE, np.inf), np.ones(SIZE, bool)
 
 
 def wall():
@@ -43,7 +45,8 @@ def test_narrow_gaps_that_show_the_scene_are_opened_and_the_rest_stays():
     filled = cv2.morphologyEx(truth.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)) > 0
     image = painted(truth, background)
     scene = match_scene(image, filled, plate_of(background))
-    before, after = (soften(image, outline.astype(np.float32), scene) for outline in (filled, correct(image, filled, scene)))
+    outlines = filled, correct(image, filled, scene, *NO_BONES)
+    before, after = (soften(image, outline.astype(np.float32), scene) for outline in outlines)
     assert before[filled & ~truth].mean() > 0.5 and after[filled & ~truth].mean() < 0.1
     assert after[truth].mean() > 0.99
 
@@ -56,7 +59,7 @@ def test_a_rim_that_was_lost_comes_back_and_a_shadow_beside_it_does_not():
     image = painted(truth, wall() * shade[..., None])
     lost = cv2.erode(truth.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
     scene = match_scene(image, lost, plate_of(wall()))
-    outline = correct(image, lost, scene)
+    outline = correct(image, lost, scene, *NO_BONES)
     assert (truth & ~outline).sum() < 0.1 * (truth & ~lost).sum()
     assert (outline & ~truth).sum() < 0.002 * truth.sum()
 
@@ -68,7 +71,49 @@ def test_clothes_that_look_like_the_scene_are_not_opened():
     image = painted(truth, background)
     plate = plate_of(background)
     image[80:160, 60:100] = plate.image[80:160, 60:100]
-    assert correct(image, truth, match_scene(image, truth, plate))[80:160, 60:100].all()
+    assert correct(image, truth, match_scene(image, truth, plate), *NO_BONES)[80:160, 60:100].all()
+
+
+def leg():
+    """xy (133, 2) px, score (133,): knee and ankle of a leg down the middle."""
+    xy, score = np.zeros((133, 2), np.float32), np.zeros(133, np.float32)
+    xy[[13, 15]], score[[13, 15]] = [(80, 60), (80, 190)], 0.9
+    return xy, score
+
+
+def camouflaged():
+    """A leg with a small part like the scene on its bone and one beside that, and a slit far from it: image, outline, plate."""
+    outline = np.zeros(SIZE, bool)
+    outline[40:200, 40:120] = True
+    image, plate = painted(outline, wall()), plate_of(wall())
+    for part in (ON_BONE, BESIDE, SLIT):
+        image[part] = plate.image[part]
+    return image, outline, plate
+
+
+ON_BONE, BESIDE, SLIT = np.s_[100:110, 74:90], np.s_[100:110, 93:98], np.s_[100:112, 111:117]
+
+
+def middle(outline, part):
+    """The outline in a part without its rim, which the blur against noise leaves alone."""
+    return outline[part][1:-1, 1:-1]
+
+
+def test_clothes_on_a_bone_that_look_like_the_scene_stay_with_what_lies_beside_and_a_slit_apart_from_it_opens():
+    image, outline, plate = camouflaged()
+    scene, likely = match_scene(image, outline, plate), np.ones(SIZE, bool)
+    kept = correct(image, outline, scene, distance_to_bones(SIZE, *leg()), likely)
+    assert kept[ON_BONE].all() and kept[BESIDE].all() and not middle(kept, SLIT).any()
+
+
+@pytest.mark.parametrize("bones", [True, False])
+def test_without_a_bone_or_where_the_network_doubts_what_looks_like_the_scene_opens(bones):
+    image, outline, plate = camouflaged()
+    xy, score = leg()
+    at = distance_to_bones(SIZE, xy, score * bones)
+    kept = correct(image, outline, match_scene(image, outline, plate), at, np.full(SIZE, not bones))
+    assert np.isinf(at).all() != bones
+    assert not any(middle(kept, part).any() for part in (ON_BONE, BESIDE, SLIT))
 
 
 def test_a_plate_is_fitted_to_the_exposure_and_one_of_another_place_is_refused():
@@ -86,7 +131,7 @@ def test_what_the_plate_never_showed_is_left_alone():
     filled = cv2.morphologyEx(truth.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8)) > 0
     image, plate = painted(truth, background), plate_of(background)
     plate.known[:130] = False
-    assert (correct(image, filled, match_scene(image, filled, plate))[:130] == filled[:130]).all()
+    assert (correct(image, filled, match_scene(image, filled, plate), *NO_BONES)[:130] == filled[:130]).all()
 
 
 @pytest.mark.parametrize(("step", "known"), [(20, True), (0, False)])
