@@ -21,6 +21,8 @@ MARKERS = {"draft": "^", "standard": "o", "fine": "s", "paper": "X"}
 QUALITIES = {"psnr_fg": "held-out PSNR on the person, as filmed, dB", "flip": "FLIP, held out, as filmed (less is better)"}
 TICKS = (20, 50, 100, 200, 500, 1000, 3000, 10_000, 50_000)
 FEW_TICKS = (25, 30, 35, 40, 60, 80)
+CROWDED = 1.8, 1.0
+"""A point up to so many times as long as an earlier one's seconds, and so many dB beside it, is named below its marker."""
 SECONDS = {"cpu": "CPU seconds of all threads, clip to avatar", "cuda": "seconds by the clock, clip to avatar; training on a GPU"}
 
 
@@ -72,10 +74,13 @@ def _draw_way(axes: Axes, some: list[Trial], name: str, colour: str, marker: str
 
 def _draw_published(axes: Axes) -> None:
     """Hollow markers of other systems, and what sets them apart."""
-    for point in POINTS:
+    points = sorted(POINTS, key=lambda point: point.seconds)
+    for i, point in enumerate(points):
+        crowded = any(point.seconds < CROWDED[0] * before.seconds and abs(point.psnr - before.psnr) < CROWDED[1]
+                      for before in points[:i])
         axes.plot(point.seconds, point.psnr, "D", mfc="none", color="0.45", ms=6)
-        axes.annotate(point.system, (point.seconds, point.psnr), xytext=(0, 6), textcoords="offset points", fontsize=6,
-                      color="0.35", ha="center")
+        axes.annotate(point.system, (point.seconds, point.psnr), xytext=(0, -12 if crowded else 6), textcoords="offset points",
+                      fontsize=6, color="0.35", ha="center")
     axes.annotate("hollow: published by others, seconds of training alone, another protocol:\n"
                   "PSNR of whole white frames of 540 px on PeopleSnapshot\n(ExAvatar: NeuMan; JOintGS: NeuMan, tight boxes)",
                   (0.02, 0.985), xycoords="axes fraction", fontsize=7, color="0.35", va="top")
