@@ -1,20 +1,23 @@
 """Avatars of any version, judged as filmed by today's code: `python -m gsac.benchmarks.as_filmed RUN TRAINED [TRAINED ...]`.
 
 RUN is the folder of a `gsac run` whose frames, masks and body fit the trainings had; TRAINED are output folders of `train`. Each
-avatar is judged twice: in its own poses, and with the held-out poses moved onto the frames at their full size by that avatar.
+avatar is judged twice: in its own poses, and with the held-out poses moved onto the frames at their full size by that avatar. With
+`--masks` it is judged by true masks, so that pipelines whose own masks differ can be compared.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import Clip
+from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import WHITE, composite, find_edge, squared_error, summary
 from gsac.avatar.threads import Workspace, side_by_side
@@ -34,24 +37,39 @@ def main() -> None:
                                      description="Avatars of any version, judged as filmed by today's code.")
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a `gsac run` up to smplx")
     parser.add_argument("trained", type=Path, nargs="+", metavar="TRAINED", help="output folder of a training on it")
+    parser.add_argument("--masks", type=Path, metavar="DIR", help="the turntable's folder mask, in the place of the run's masks")
     options = parser.parse_args()
     for folder in options.trained:
-        print(json.dumps({"trained": folder.name} | judge_as_filmed(options.run, folder)), flush=True)
+        print(json.dumps({"trained": folder.name} | judge_as_filmed(options.run, folder, options.masks)), flush=True)
 
 
-def judge_as_filmed(run: Path, trained: Path) -> dict[str, float | None]:
+def judge_as_filmed(run: Path, trained: Path, masks: Path | None = None) -> dict[str, float | None]:
     """`FIGURES` and those of `judge_edge` over the training's held-out frames, and the same with `_moved`.
 
-    run: folder of the run; trained: output folder of `train`.
+    run: folder of the run; trained: output folder of `train`; masks: folder of true masks, one for each frame.
     """
     clip, fit = Clip.read(run / "split/clip.json"), BodyParams.read(run / "smplx/body.npz")
     held = json.loads((trained / "metrics.json").read_text())["heldout_frames"]
-    views = read_whole(run / "split/frames", run / "segment/alpha", fit.camera(clip.width, clip.height), held, fit.occluder)
+    camera = fit.camera(clip.width, clip.height)
+    views = (read_whole(run / "split/frames", run / "segment/alpha", camera, held, fit.occluder) if masks is None
+             else read_true(run / "split/frames", masks, camera, held))
     gaussians, poses = Gaussians.read(trained / "avatar.npz"), Poses(Body.load(), BodyParams.read(trained / "body.npz"))
     moved = poses.copy()
     converge(gaussians, moved, held, views, ROUNDS)
     return {f"{name}{ending}": value for ending, own in (("", poses), ("_moved", moved))
             for name, value in _judge(gaussians, own, views).items()}
+
+
+def read_true(frames: Path, masks: Path, camera: Camera, held: Iterable[int]) -> dict[int, View]:
+    """Frame -> its view by its true mask. frames: `split/frames`; masks: folder of %06d.png, as the turntable writes them."""
+    paths, views = frame_paths(frames), {}
+    for t in held:
+        mask = cv2.imread(str(masks / paths[t].name), cv2.IMREAD_GRAYSCALE)
+        if mask is None:
+            raise SystemExit(f"{masks} has no mask {paths[t].name}")
+        pixels = np.dstack([read_frame(paths[t]) * (mask[..., None] / 255), mask])
+        views[t] = View(camera, np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0))
+    return views
 
 
 def judge_edge(gaussians: Gaussians, poses: Poses, views: Mapping[int, View]) -> dict[str, float]:

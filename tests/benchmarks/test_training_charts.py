@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gsac.avatar.artifacts import write_frame, write_image
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.zbuffer import rasterise
 from gsac.benchmarks import as_filmed, training
@@ -167,6 +169,21 @@ def test_an_avatar_that_is_wider_than_its_mask_errs_more_about_the_outline_and_s
     gaussians.log_scale += 0.7
     wide = as_filmed.judge_edge(gaussians, poses, shown)
     assert wide["stray_edge"] > 2 * clean["stray_edge"] and wide["edge_error"] > clean["edge_error"]
+
+
+def test_a_true_mask_is_the_alpha_of_its_frame_and_one_that_is_not_there_is_named(tmp_path):
+    for folder in ("frames", "masks"):
+        (tmp_path / folder).mkdir()
+    for t in range(2):
+        write_frame(tmp_path / f"frames/{t:06d}.png", np.full((8, 6, 3), 100, np.uint8))
+    mask = np.zeros((8, 6), np.uint8)
+    mask[2:6], mask[6] = 255, 128
+    write_image(tmp_path / "masks/000001.png", mask)
+    camera = Camera((10, 10), (3, 4), 6, 8)
+    pixels = as_filmed.read_true(tmp_path / "frames", tmp_path / "masks", camera, [1])[1].pixels
+    assert (pixels[..., 3] == mask).all() and (pixels[3, :, :3] == 100).all() and (pixels[6, :, :3] == 50).all()
+    with pytest.raises(SystemExit, match="has no mask 000000.png"):
+        as_filmed.read_true(tmp_path / "frames", tmp_path / "masks", camera, [0])
 
 
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):
