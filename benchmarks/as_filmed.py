@@ -9,18 +9,17 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths
 from gsac.avatar.body import Body, BodyParams
-from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import WHITE, composite, find_edge, squared_error, summary
 from gsac.avatar.threads import Workspace, side_by_side
+from gsac.benchmarks.speed_accuracy.novel_poses import read_view
 from gsac.stages.train.judge.heldout import judge, render_view, truth
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses
@@ -50,26 +49,17 @@ def judge_as_filmed(run: Path, trained: Path, masks: Path | None = None) -> dict
     """
     clip, fit = Clip.read(run / "split/clip.json"), BodyParams.read(run / "smplx/body.npz")
     held = json.loads((trained / "metrics.json").read_text())["heldout_frames"]
-    camera = fit.camera(clip.width, clip.height)
-    views = (read_whole(run / "split/frames", run / "segment/alpha", camera, held, fit.occluder) if masks is None
-             else read_true(run / "split/frames", masks, camera, held))
+    frames = run / "split/frames"
+    if masks is None:
+        views = read_whole(frames, run / "segment/alpha", fit.camera(clip.width, clip.height), held, fit.occluder)
+    else:
+        paths = frame_paths(frames)
+        views = {t: read_view(paths[t], masks / paths[t].name, fit) for t in held}
     gaussians, poses = Gaussians.read(trained / "avatar.npz"), Poses(Body.load(), BodyParams.read(trained / "body.npz"))
     moved = poses.copy()
     converge(gaussians, moved, held, views, ROUNDS)
     return {f"{name}{ending}": value for ending, own in (("", poses), ("_moved", moved))
             for name, value in _judge(gaussians, own, views).items()}
-
-
-def read_true(frames: Path, masks: Path, camera: Camera, held: Iterable[int]) -> dict[int, View]:
-    """Frame -> its view by its true mask. frames: `split/frames`; masks: folder of %06d.png, as the turntable writes them."""
-    paths, views = frame_paths(frames), {}
-    for t in held:
-        mask = cv2.imread(str(masks / paths[t].name), cv2.IMREAD_GRAYSCALE)
-        if mask is None:
-            raise SystemExit(f"{masks} has no mask {paths[t].name}")
-        pixels = np.dstack([read_frame(paths[t]) * (mask[..., None] / 255), mask])
-        views[t] = View(camera, np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0))
-    return views
 
 
 def judge_edge(gaussians: Gaussians, poses: Poses, views: Mapping[int, View]) -> dict[str, float]:

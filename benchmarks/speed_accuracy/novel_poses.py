@@ -79,12 +79,18 @@ def read_views(clip: Path, truth: BodyParams, height: int | None) -> list[View]:
     """The clip's frames with their masks as alpha, `height` px high, or as they are."""
     views = []
     for path in frame_paths(clip / "frames"):
-        rgb, mask = read_frame(path), cv2.imread(str(clip / "mask" / path.name), cv2.IMREAD_GRAYSCALE)
-        camera = truth.camera(mask.shape[1], mask.shape[0])
-        pixels = np.dstack([rgb * (mask[..., None] / 255), mask])
-        view = View(camera, np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0))
+        view = read_view(path, clip / "mask" / path.name, truth)
         views.append(view.reduced(height) if height else view)
     return views
+
+
+def read_view(frame: Path, mask: Path, params: BodyParams) -> View:
+    """A frame with its true mask as alpha. Raises FileNotFoundError without a mask."""
+    rgb, alpha = read_frame(frame), cv2.imread(str(mask), cv2.IMREAD_GRAYSCALE)
+    if alpha is None:
+        raise FileNotFoundError(f"{mask}: there is no such mask")
+    pixels = np.dstack([rgb * (alpha[..., None] / 255), alpha])
+    return View(params.camera(alpha.shape[1], alpha.shape[0]), np.clip(np.round(pixels), 0, 255).astype(np.uint8), (0, 0))
 
 
 def transfer_poses(own: BodyParams, truth: BodyParams, body: Body) -> BodyParams:

@@ -6,11 +6,11 @@ gives  alpha/%06d.exr (H, W) half, 0..1; with method sapiens also alpha/labels/%
        each pixel shows (`avatar/sapiens.py` lists them), 0 where it is none
 
 A person network finds the rough region (`network.py`), GrabCut at half size its outline (`grabcut.py`), of which the parts that
-are no person are dropped (`components.py`). At full size the outline is corrected by the empty scene (`correction.py`), and the
-colours on both sides of it give the soft edge (`matting.py`). Each step uses a plate, the empty scene, where there is one
-(`plate.py`); from a video of a still camera it is computed, once from the rough regions and again from the outlines
-(`plate_from_video.py`). The alpha of Sapiens, a network that the user brings, is
-soft already and corrected by the plate only (`avatar/sapiens.py`). Masks that the user brought stay as they are (`brought.py`).
+are no person are dropped (`components.py`). At full size the outline is corrected by the empty scene (`correction.py`), where the
+bones tell clothes that look like it from gaps (`bones.py`), and the colours on both sides of it give the soft edge (`matting.py`).
+Each step uses a plate, the empty scene, where there is one (`plate.py`); from a video of a still camera it is computed, once from
+the rough regions and again from the outlines (`plate_from_video.py`). The alpha of Sapiens, a network that the user brings, is soft
+already and corrected by the plate only (`avatar/sapiens.py`). Masks that the user brought stay as they are (`brought.py`).
 """
 
 from gsac.avatar.artifacts import check_image_folder

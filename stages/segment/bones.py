@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 
-BONES = ((5, 7), (7, 9), (6, 8), (8, 10), (11, 13), (13, 15), (12, 14), (14, 16),
-         (5, 6), (11, 12), (5, 11), (6, 12), (5, 12), (6, 11))
-"""Pairs of points: arms, legs, the trunk's sides and diagonals."""
+from gsac.avatar.wholebody import INDEX
+
+CHAINS = ("left_wrist left_elbow left_shoulder left_hip left_knee left_ankle",
+          "right_wrist right_elbow right_shoulder right_hip right_knee right_ankle",
+          "left_shoulder right_shoulder left_hip right_hip left_shoulder")
+"""Points that bones join, one to the next: both sides, and across the trunk."""
+BONES = tuple(pair for chain in CHAINS for pair in pairwise(INDEX[name] for name in chain.split()))
 SEEN = 0.3
 """Least score of both points of a bone."""
 
@@ -15,9 +21,11 @@ SEEN = 0.3
 def distance_to_bones(shape: tuple[int, int], xy: np.ndarray, score: np.ndarray) -> np.ndarray:
     """(H, W) float32 px, from each pixel to the nearest bone; infinite where no bone is seen. shape: H, W; xy: (133, 2) px; score:
     (133,)."""
+    if not any(score[list(ends)].min() > SEEN for ends in BONES):
+        return np.full(shape, np.inf, np.float32)
     apart = np.ones(shape, np.uint8)
     for ends in BONES:
         if score[list(ends)].min() > SEEN:
             first, last = xy[list(ends)].round().astype(int).tolist()
             cv2.line(apart, first, last, 0)
-    return cv2.distanceTransform(apart, cv2.DIST_L2, 5) if not apart.all() else np.full(shape, np.inf, np.float32)
+    return cv2.distanceTransform(apart, cv2.DIST_L2, 5)

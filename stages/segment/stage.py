@@ -59,7 +59,7 @@ class Cutout(NamedTuple):
     score: np.ndarray
     """(133,)."""
     likely: np.ndarray
-    """(h, w) bool, where the network is sure enough for clothes that look like the scene."""
+    """(h, w / 8) uint8, its bits: where the network is sure enough for clothes that look like the scene."""
     soft: np.ndarray | None = None
     """(h, w) half in 0..1, the alpha of a network whose edge is soft already."""
 
@@ -237,7 +237,7 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
     """
     box = around(probability)
     if box is None:
-        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0], xy, score, np.zeros((0, 0), bool)), True
+        return nobody(image, xy, score), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     corner = np.array(box[:2])
     here = None
@@ -248,7 +248,8 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
         here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
     xy = xy - corner
     outline = keep_person(cut_out(image[part], probability[part], xy, score, iterations, here), xy, score) > 0.5
-    return Cutout(box, outline, image[part].copy(), xy, score, probability[part] > LIKELY), plate is None or here is not None
+    cutout = Cutout(box, outline, image[part].copy(), xy, score, np.packbits(probability[part] > LIKELY, axis=1))
+    return cutout, plate is None or here is not None
 
 
 def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: np.ndarray,
@@ -260,14 +261,20 @@ def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: 
     kept = keep_soft_person(alpha, xy, score)
     box = around(kept)
     if box is None:
-        return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0], xy, score, np.zeros((0, 0), bool)), True
+        return nobody(image, xy, score), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     fits = True
     if plate is not None:
         x0, y0, x1, y1 = wide = around(kept, margin=WIDE) or box
         fits = compare(image[y0:y1, x0:x1], half_of(plate, wide), kept[y0:y1, x0:x1]) is not None
     soft = kept[part]
-    return Cutout(box, soft > 0.5, image[part].copy(), xy - box[:2], score, soft > LIKELY, soft.astype(np.float16)), fits
+    likely = np.packbits(soft > LIKELY, axis=1)
+    return Cutout(box, soft > 0.5, image[part].copy(), xy - box[:2], score, likely, soft.astype(np.float16)), fits
+
+
+def nobody(image: np.ndarray, xy: np.ndarray, score: np.ndarray) -> Cutout:
+    """The cut-out of a frame that shows nobody. image: (H, W, 3) uint8; xy: (133, 2) px; score: (133,)."""
+    return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0], xy, score, np.zeros((0, 0), np.uint8))
 
 
 def keep_labels(labels: np.ndarray, cutout: Cutout) -> np.ndarray:
@@ -293,7 +300,8 @@ def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.nd
     scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
     if scene is not None:
         bones = distance_to_bones(outline.shape, cutout.xy, cutout.score)
-        outline = correct(part, outline, scene, bones, cutout.likely)
+        likely = np.unpackbits(cutout.likely, axis=1, count=outline.shape[1]) > 0
+        outline = correct(part, outline, scene, bones, likely)
     alpha[y0:y1, x0:x1] = soften(part, outline.astype(np.float32), scene) if cutout.soft is None else cutout.soft
     if cutout.soft is not None and scene is not None:
         near = cv2.dilate((outline != cutout.outline).astype(np.uint8), np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)) > 0

@@ -10,7 +10,6 @@ import pytest
 from gsac.avatar.artifacts import write_frame, write_image
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
-from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.zbuffer import rasterise
 from gsac.benchmarks import as_filmed, training
@@ -172,18 +171,15 @@ def test_an_avatar_that_is_wider_than_its_mask_errs_more_about_the_outline_and_s
 
 
 def test_a_true_mask_is_the_alpha_of_its_frame_and_one_that_is_not_there_is_named(tmp_path):
-    for folder in ("frames", "masks"):
-        (tmp_path / folder).mkdir()
-    for t in range(2):
-        write_frame(tmp_path / f"frames/{t:06d}.png", np.full((8, 6, 3), 100, np.uint8))
+    write_frame(tmp_path / "frame.png", np.full((8, 6, 3), 100, np.uint8))
     mask = np.zeros((8, 6), np.uint8)
     mask[2:6], mask[6] = 255, 128
-    write_image(tmp_path / "masks/000001.png", mask)
-    camera = Camera((10, 10), (3, 4), 6, 8)
-    pixels = as_filmed.read_true(tmp_path / "frames", tmp_path / "masks", camera, [1])[1].pixels
+    write_image(tmp_path / "mask.png", mask)
+    params = BodyParams.from_pose(*(np.zeros(shape) for shape in ((1, 55, 3), (1, 3), 10, (1, 52))), 10, (3, 4))
+    pixels = novel_poses.read_view(tmp_path / "frame.png", tmp_path / "mask.png", params).pixels
     assert (pixels[..., 3] == mask).all() and (pixels[3, :, :3] == 100).all() and (pixels[6, :, :3] == 50).all()
-    with pytest.raises(SystemExit, match="has no mask 000000.png"):
-        as_filmed.read_true(tmp_path / "frames", tmp_path / "masks", camera, [0])
+    with pytest.raises(FileNotFoundError, match="other.png: there is no such mask"):
+        novel_poses.read_view(tmp_path / "frame.png", tmp_path / "other.png", params)
 
 
 def test_a_folder_that_is_no_run_is_refused_by_name(tmp_path):

@@ -117,15 +117,16 @@ class Search:
             hidden.hold(alone, trial)
             return bend_arm(alone, trial, STEPS)
 
-        best, least = self.state, np.inf
+        tries, costs = [], []
         for start in starts:
             trial = isolate_state(self.state, stay, start)
             for off in (FAR_OFF, NEAR_OFF):
                 alone.limit = off * ROBUST
                 trial = bend(trial)
             hidden.hold(alone, trial)
-            if (cost := alone.cost(trial)) < least:
-                best, least = trial, cost
+            tries.append(trial)
+            costs.append(alone.cost(trial))
+        best = tries[int(np.argmin(costs))]
         alone.outline_weight = self.problem.outline_weight
         for _ in range(OUTLINES):
             alone.outline_pairs, _ = meet_outlines(alone, best)
