@@ -6,15 +6,14 @@ Only the module of the command that was typed is imported: a run with nothing to
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
-import signal
 import sys
 from functools import partial
 from typing import Any
 
 from gsac.pipeline import commands
 from gsac.pipeline.errors import attached_summary, exit_code, sentence
+from gsac.pipeline.interrupts import interrupts_heard
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.reporter import Verbosity
@@ -29,9 +28,11 @@ def main(argv: list[str] | None = None) -> None:
 
 def execute(argv: list[str]) -> ExitCode:
     """Runs one command line; a user's mistake is one line on stderr, never a traceback."""
-    with contextlib.suppress(ValueError):  # not in the main thread
-        for how in (signal.SIGTERM, signal.SIGHUP):
-            signal.signal(how, _interrupt)
+    with interrupts_heard():
+        return _execute(argv)
+
+
+def _execute(argv: list[str]) -> ExitCode:
     arguments = None
     try:
         arguments = make_parser(argv).parse_args(argv)
@@ -100,11 +101,6 @@ def _give_up(message: str, code: ExitCode, arguments: argparse.Namespace | None,
         emit({"stages": [], "outputs": {}, "metrics": {}} | attached_summary(error) | {"error": message})
     print(fit(f"gsac: {message}", sys.stderr), file=sys.stderr, flush=True)
     return code
-
-
-def _interrupt(signum: int, frame: Any) -> None:
-    signal.signal(signum, signal.SIG_DFL)
-    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":
