@@ -7,7 +7,8 @@ gives  alpha/%06d.exr (H, W) half, 0..1; with method sapiens also alpha/labels/%
 
 A person network finds the rough region (`network.py`), GrabCut at half size its outline (`grabcut.py`), of which the parts that
 are no person are dropped (`components.py`). At full size the outline is corrected by the empty scene (`correction.py`), where the
-bones tell clothes that look like it from gaps (`bones.py`), and the colours on both sides of it give the soft edge (`matting.py`).
+bones tell clothes that look like it from gaps (`bones.py`), and the colours on both sides of it, and their course from pixel to
+pixel, give the soft edge (`matting.py`, its loops in `matting_kernels.py`).
 Each step uses a plate, the empty scene, where there is one (`plate.py`); from a video of a still camera it is computed, once from
 the rough regions and again from the outlines (`plate_from_video.py`). The alpha of Sapiens, a network that the user brings, is soft
 already and corrected by the plate only (`avatar/sapiens.py`). Masks that the user brought stay as they are (`brought.py`).
@@ -22,6 +23,6 @@ STAGE = Stage(
     inputs=("split/frames", "split/clip.json", "keypoints/keypoints.npz"),
     outputs=(Output("alpha", check_image_folder),),
     config=SegmentConfig,
-    packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "OpenEXR", "onnxruntime", "torch"),
+    packages=("numpy", "numba", "llvmlite", "opencv-contrib-python-headless", "ai-edge-litert", "OpenEXR", "onnxruntime", "torch"),
     models=lambda config: config.models(),
 )

@@ -1,28 +1,63 @@
-"""The soft edge: the alpha of each pixel near the outline, from the mean colours on both sides of it."""
+"""The soft edge: alpha near the outline, from the colours on both sides of it and their course from pixel to pixel."""
 
 from __future__ import annotations
 
 import cv2
 import numpy as np
 
+from gsac.stages.segment.matting_kernels import matting_rows, solve_rows
 from gsac.stages.segment.plate import Plate
 
-BAND = 2
+BAND = 4
 """Pixels on each side of the outline whose alpha is computed."""
+NEAR = 1
+"""Those of them whose own colour says how much of each side is in it; the others begin as the outline has them."""
 REACH = 5
 """Half width, px, of the window in which the colours of both sides are averaged."""
 CONTRAST = 0.1
 """Distance of both colours (RGB, 0..1) at which alpha is half theirs, half the smoothed outline's; less distance, more outline."""
+NOISE = 3e-5
+"""Variance of a colour (0..1) within one surface."""
+HOLD = 0.1
+"""Weight of a pixel's first alpha beside the matting Laplacian, whose diagonal is about 8."""
+STEPS = 15
+"""Of the solver, after which the error of alpha no longer falls."""
+
+HAZE = 0.1
+"""Alpha that counts as none, and below 1 as whole: a smooth solution leaves so much of each side beyond the edge."""
 
 
-def soften(image: np.ndarray, outline: np.ndarray, plate: Plate | None = None, band: int = BAND) -> np.ndarray:
+def soften(image: np.ndarray, outline: np.ndarray, plate: Plate | None = None) -> np.ndarray:
     """image: (H, W, 3) uint8; outline: (H, W) 0..1; plate: the empty scene in the frame's exposure.
 
-    Returns (H, W) float32 alpha: 1 inside, 0 outside, in the band the a of colour = a F + (1 - a) B.
+    Returns (H, W) float32 alpha: 1 inside, 0 outside, in the band closed-form matting (Levin et al. 2008) that begins at, and is
+    held to, `share_of_colours`.
+    """
+    alpha = share_of_colours(image, outline, plate)
+    hard, around = (outline > 0.5).astype(np.uint8), _square(BAND)
+    unknown = (cv2.erode(hard, around) == 0) & (cv2.dilate(hard, around) > 0)
+    rows, columns = np.nonzero(unknown)
+    if len(rows) == 0 or min(outline.shape) < 3:
+        return alpha
+    order = np.full(outline.shape, -1, np.int32)
+    order[rows, columns] = np.arange(len(rows))
+    windows = np.zeros(outline.shape, np.uint8)
+    windows[1:-1, 1:-1] = cv2.dilate(unknown.astype(np.uint8), _square(1))[1:-1, 1:-1]
+    laplacian, pulls = matting_rows(image, order, alpha, np.argwhere(windows), NOISE)
+    first, width = alpha[rows, columns], outline.shape[1] + 4
+    laplacian[:, 2, 2] += HOLD
+    solved = solve_rows(laplacian, (rows + 2) * width + columns + 2, width, pulls + np.float32(HOLD) * first, first, STEPS)
+    alpha[rows, columns] = np.clip((solved - HAZE) / (1 - 2 * HAZE), 0, 1)
+    return alpha
+
+
+def share_of_colours(image: np.ndarray, outline: np.ndarray, plate: Plate | None = None) -> np.ndarray:
+    """Of each pixel within `NEAR` by itself: the a of its colour = a F + (1 - a) B, F and B the mean colours of both sides.
+
+    image: (H, W, 3) uint8; outline: (H, W) 0..1; plate: as in `soften`. Returns (H, W) float32 alpha, 1 inside, 0 outside.
     """
     hard = (outline > 0.5).astype(np.uint8)
-    around = np.ones((2 * band + 1, 2 * band + 1), np.uint8)
-    inside, beyond = cv2.erode(hard, around), cv2.dilate(hard, around) == 0
+    inside, beyond = cv2.erode(hard, _square(NEAR)), cv2.dilate(hard, _square(NEAR)) == 0
     alpha = inside.astype(np.float32)
     rows, columns = np.nonzero((inside == 0) & ~beyond)
     if len(rows) == 0:
@@ -50,6 +85,11 @@ def soften(image: np.ndarray, outline: np.ndarray, plate: Plate | None = None, b
     smooth = cv2.GaussianBlur(outline[window].astype(np.float32), (0, 0), 1)[at]
     alpha[rows, columns] = trust * share + (1 - trust) * smooth
     return alpha
+
+
+def _square(reach: int) -> np.ndarray:
+    """The neighbourhood of so many px to each side."""
+    return np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
 
 
 def _mean(image: np.ndarray, weight: np.ndarray, at: tuple, count: np.ndarray) -> np.ndarray:

@@ -91,6 +91,11 @@ def run(job: Job) -> None:
         job.warn(Finding.of(Code.CAMERA_MOVES, moved, figure=np.nanmax(sway)))
 
 
+def warm(device: str) -> None:
+    """Loads the loops of the soft edge, or compiles them the very first time; called while a stage before is at work."""
+    soften(np.zeros((9, 9, 3), np.uint8), np.eye(9, dtype=np.float32))
+
+
 def use_brought(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray]) -> np.ndarray:
     """Hands on the masks that came with the footage. paths: T frames; keypoints: their arrays (T, ...) by name. Returns (T,) px,
     how far the camera sways."""
