@@ -41,13 +41,14 @@ def matting_rows(pixels, order, known, centres, noise):
                 continue
             r, g, b = rgb[i, 0], rgb[i, 1], rgb[i, 2]
             r, g, b = (RR * r + RG * g + RB * b) / det, (RG * r + GG * g + GB * b) / det, (RB * r + GB * g + BB * b) / det
-            for j in range(9):
-                value = (i == j) - (1 + r * rgb[j, 0] + g * rgb[j, 1] + b * rgb[j, 2]) / 9
-                y, x = top + j // 3, left + j % 3
-                if order[y, x] >= 0:
-                    rows[row, j // 3 - i // 3 + 2, j % 3 - i % 3 + 2] += value
-                else:
-                    pulls[row] -= value * known[y, x]
+            for dy in range(3):
+                for dx in range(3):
+                    j, y, x = 3 * dy + dx, top + dy, left + dx
+                    value = (i == j) - (1 + r * rgb[j, 0] + g * rgb[j, 1] + b * rgb[j, 2]) / 9
+                    if order[y, x] >= 0:
+                        rows[row, dy - i // 3 + 2, dx - i % 3 + 2] += value
+                    else:
+                        pulls[row] -= value * known[y, x]
     return rows, pulls
 
 
