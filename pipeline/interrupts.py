@@ -40,7 +40,7 @@ def interrupts_heard() -> Iterator[None]:
     finally:
         signal.set_wakeup_fd(told_before)
         for how, handler in before.items():
-            signal.signal(how, handler)
+            signal.signal(how, handler or signal.SIG_DFL)  # None: another library's, which Python cannot put back
         os.close(tell)
 
 

@@ -22,7 +22,6 @@ HOLD = 0.1
 """Weight of a pixel's first alpha beside the matting Laplacian, whose diagonal is about 8."""
 STEPS = 15
 """Of the solver, after which the error of alpha no longer falls."""
-
 HAZE = 0.1
 """Alpha that counts as none, and below 1 as whole: a smooth solution leaves so much of each side beyond the edge."""
 

@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from gsac.pipeline.cli import execute
+
 MISSED = """
 import os, signal, sys, threading, time
 from gsac.pipeline.interrupts import interrupts_heard
@@ -38,8 +40,6 @@ def test_an_interrupt_that_no_wait_of_the_main_thread_has_noticed_ends_that_wait
 
 
 def test_signals_have_their_handlers_of_before_after_a_command():
-    from gsac.pipeline.cli import execute
-
     def handlers():
         return [signal.getsignal(how) for how in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGURG)]
 
