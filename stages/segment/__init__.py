@@ -23,6 +23,7 @@ STAGE = Stage(
     inputs=("split/frames", "split/clip.json", "keypoints/keypoints.npz"),
     outputs=(Output("alpha", check_image_folder),),
     config=SegmentConfig,
-    packages=("numpy", "numba", "llvmlite", "opencv-contrib-python-headless", "ai-edge-litert", "OpenEXR", "onnxruntime", "torch"),
+    packages=("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headless", "ai-edge-litert", "OpenEXR", "onnxruntime",
+              "torch"),
     models=lambda config: config.models(),
 )
