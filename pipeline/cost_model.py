@@ -103,7 +103,7 @@ MODELS = {
     ("split", "cpu"): Model(_split, (0.65, 0.04), 0.1),
     ("keypoints", "cpu"): Model(_keypoints, (0.5, 0.1, 0.013), 0.07),
     ("handgap", "cpu"): Model(_frames, (0.19, 0.0039), 0.0),
-    ("segment", "cpu"): Model(_segment, (0.4, 0.11, 0.035, 0.018), 0.05),
+    ("segment", "cpu"): Model(_segment, (0.6, 0.11, 0.035, 0.018), 0.05),
     ("face", "cpu"): Model(_frames, (0.58, 0.011), 0.1),
     ("smplx", "cpu"): Model(_smplx, (1.7, 0.013, 0.0008), 0.45),
     ("train", "cpu"): Model(_train("cpu"), (2.3, 0.09, 0.063, 0.0053, 0.036, 1.7e-7), 0.15),

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 REQUESTS = (signal.SIGTERM, signal.SIGHUP)
-"""Raise KeyboardInterrupt, as Ctrl-C does; a second one ends the process at once."""
+"""Raise KeyboardInterrupt, as Ctrl-C does; a second one ends the process at once. Under nohup a hangup stays ignored."""
 NUDGE = signal.SIGURG
 """Only ends the system call that the main thread waits in; processes that do not ask for it never notice it."""
 NUDGE_S = 0.1
@@ -32,7 +32,9 @@ def interrupts_heard() -> Iterator[None]:
         return
     told, tell = os.pipe()
     os.set_blocking(tell, False)
-    before = {how: signal.signal(how, _interrupt) for how in REQUESTS} | {NUDGE: signal.signal(NUDGE, _ignore)}
+    nohup = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    before = {how: signal.signal(how, _interrupt) for how in REQUESTS if not (nohup and how == signal.SIGHUP)}
+    before[NUDGE] = signal.signal(NUDGE, _ignore)
     told_before = signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
     threading.Thread(target=_nudge, args=(told, threading.get_ident()), daemon=True).start()
     try:

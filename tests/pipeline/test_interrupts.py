@@ -31,6 +31,16 @@ with interrupts_heard():
         print("heard")
 """
 
+HANGUP = """
+import os, signal
+from gsac.pipeline.interrupts import interrupts_heard
+
+signal.signal(signal.SIGHUP, signal.SIG_IGN)
+with interrupts_heard():
+    os.kill(os.getpid(), signal.SIGHUP)
+print("done")
+"""
+
 
 @pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("wait", ["wait_for_a_byte", "wait_for_a_thread"])
@@ -46,3 +56,8 @@ def test_signals_have_their_handlers_of_before_after_a_command():
     before = handlers()
     execute([])
     assert handlers() == before
+
+
+def test_a_command_under_nohup_outlives_its_terminal():
+    done = subprocess.run([sys.executable, "-c", HANGUP], capture_output=True, text=True, timeout=30)
+    assert (done.returncode, done.stdout) == (0, "done\n")
