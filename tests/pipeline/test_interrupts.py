@@ -23,6 +23,7 @@ def wait_for_a_thread():
     threading.Event().wait()
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whatever the tests themselves run under
 with interrupts_heard():
     threading.Thread(target=miss).start()
     try:
