@@ -15,10 +15,11 @@ from gsac.stages.train.config import FAST_STEPS, coarse_share, coarse_steps
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
-from gsac.stages.train.fast.schedule import MIDWAY, OFFSET_SHARE, person_pixels
+from gsac.stages.train.fast.schedule import OFFSET_SHARE, correction_steps, person_pixels
 from gsac.stages.train.fast.trainer import AT_ONCE, Step, Trainer
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import Equations, FrameEquations, correct_midway
+from gsac.stages.train.poses.own_errors import correct_each
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, Views, of_each
@@ -47,11 +48,12 @@ class Cpu(Backend):
             trainer, first = Trainer.from_state(task.resumed["trainer"], task), task.resumed["step"]
             order, rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
             task.resumed = None
-        midway = round(MIDWAY * steps) // AT_ONCE * AT_ONCE if config.pose_rounds else -1
+        corrections = correction_steps(config, steps, self.device, AT_ONCE)
         for step in range(first, steps, AT_ONCE):
-            if step == midway:
-                opened = self.open_equations(task, trainer.gaussians(), coarse if step < coarse_until else fine)
-                correct_midway(task.poses, task.trained, trainer.gaussians, opened)
+            if step in corrections:
+                with self.open_equations(task, trainer.gaussians(), coarse if step < coarse_until else fine) as equations:
+                    correct = correct_midway if step == corrections[0] else correct_each
+                    correct(task.poses, task.trained, trainer.gaussians, equations)
             if trainer.offsets and step / steps >= OFFSET_SHARE:
                 trainer.fold_offsets()
                 trainer.lay_unseen(coarse)

@@ -31,7 +31,7 @@ from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians import cloth_offsets
 from gsac.stages.train.gpu import LPIPS_STEPS, hand_back, open_trainer, train_until
 from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
-from gsac.stages.train.poses import bundle_adjust
+from gsac.stages.train.poses import bundle_adjust, own_errors
 from gsac.stages.train.poses.bundle_adjust import Equations
 from gsac.stages.train.poses.photometric import CURVATURE, NormalEquations, joint_shares
 from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, TURN, Poses
@@ -57,16 +57,14 @@ class Cuda(Backend):
         recipe = make_recipe(task.config, count, coarse_share=coarse_steps(schedule.person_pixels(task), steps) / steps,
                              least=schedule.shortest_axis(task), **lpips_options(task))
         with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer:
-            if task.config.pose_rounds:
-                self.correct_midway(trainer, task, coarse)
-            train_until(trainer, task, math.ceil(recipe.offset_share * recipe.steps))
+            self.train_correcting(trainer, task, coarse, math.ceil(recipe.offset_share * recipe.steps))
             body = trainer.body
             folded = cloth_offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
             task.poses.offset = np.zeros_like(task.poses.offset)
             middle = Trainer(folded, task, frozen_body=True)
             middle.lay_unseen(coarse)
             trainer.replace(middle.gaussians(), ~middle.seen, middle.reach)
-            train_until(trainer, task, recipe.steps)
+            self.train_correcting(trainer, task, coarse, recipe.steps)
             hand_back(trainer, task)
             kept = take_over(trainer, task)
             kept.seen = middle.seen
@@ -111,14 +109,17 @@ class Cuda(Backend):
             yield CudaEquations(trainer, task.poses, frames)
             task.gpu_seconds += trainer.seconds
 
-    def correct_midway(self, trainer: CudaTrainer, task: Task, views: dict[int, View]) -> None:
-        """Trains up to where `Cpu.train` corrects all poses together, and corrects them by views of half the size, as there."""
-        if midway := round(schedule.MIDWAY * trainer.recipe.steps):
-            train_until(trainer, task, midway)
-            poses, trained = task.poses, task.trained
-            opened = self.open_equations(task, trainer.gaussians(), views)
-            if bundle_adjust.correct_midway(poses, trained, trainer.gaussians, opened):
+    def train_correcting(self, trainer: CudaTrainer, task: Task, views: dict[int, View], until: int) -> None:
+        """Trains up to a step, and corrects the poses on the way where `Cpu.train` does, by views of half the size."""
+        poses, trained = task.poses, task.trained
+        for number, step in enumerate(schedule.correction_steps(task.config, trainer.recipe.steps, self.device)):
+            if trainer.state().step < step <= until:
+                train_until(trainer, task, step)
+                correct = own_errors.correct_each if number else bundle_adjust.correct_midway
+                with self.open_equations(task, trainer.gaussians(), views) as equations:
+                    correct(poses, trained, trainer.gaussians, equations)
                 trainer.place(poses.pose[trained], poses.transl[trained])
+        train_until(trainer, task, until)
 
     def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""

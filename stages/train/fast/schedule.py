@@ -9,6 +9,9 @@ from gsac.stages.train.task import Task
 
 MIDWAY = 0.3
 """Share of the steps after which the poses of all frames are corrected together once more."""
+LATE = {"cpu": (0.36, 0.44, 0.52, 0.6, 0.68, 0.76), "cuda": (0.45, 0.6, 0.75)}
+"""Shares of the steps after which each frame's own error is taken out of its pose, by device: in as many steps as the GPU takes, Adam
+does half of it."""
 OFFSET_SHARE = 0.6
 """Share of the steps, the first, that also displace the body's surface to clothes and hair."""
 OFFSET_RATE = 1e-3
@@ -21,6 +24,15 @@ FINEST = 0.4
 """px of the frames, the shortest axis of a gaussian, about that of a pixel: from near, nothing finer shows."""
 LATE_REACH = 0.25
 """Share of `train.reach` that a gaussian may move once the surface is folded in: clothes and hair are in the gaussians by then."""
+
+
+def correction_steps(config: TrainConfig, steps: int, device: str, multiple: int = 1) -> list[int]:
+    """Steps before which Gauss-Newton corrects the poses: first those of all frames together, from then on each by itself.
+
+    device: cpu or cuda; multiple: of which they are.
+    """
+    shares = (MIDWAY, *LATE[device]) if config.pose_rounds else ()
+    return [round(share * steps) // multiple * multiple for share in shares]
 
 
 def budget(task: Task, device: str) -> int:

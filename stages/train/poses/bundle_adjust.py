@@ -7,7 +7,6 @@ untrained frames are corrected like those around them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -36,31 +35,25 @@ MOSTLY = 0.5
 """Least share of the trained frames that are near to the next one."""
 SOLVER_STEPS, SOLVED = 60, 1e-10
 """Most steps of conjugate gradients, and the share of the squared residual at which they end."""
-MIDWAY_ROUNDS, MIDWAY_SHARE = 2, 0.3
-"""Rounds midway through a training, and the share of TURN and SHIFT that is still their sigma."""
+MIDWAY_SHARE = 0.3
+"""Share of TURN and SHIFT that is still their sigma midway through a training."""
 
 
 Equations = Callable[[Gaussians], list[tuple[int, NormalEquations]]]
 """Of gaussians: each frame with its normal equations, the poses as they stand."""
 
 
-def correct_midway(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaussians],
-                   opened: AbstractContextManager[Equations]) -> bool:
+def correct_midway(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaussians], equations: Equations) -> None:
     """Corrects all poses midway through a training, when the avatar constrains them better than at the start.
 
-    trained: (n,) indices of frames; gaussians: returns them as they stand; opened: the equations, not yet entered. Returns whether
-    it did: not where views `are_apart`.
+    trained: (n,) indices of frames; gaussians: returns them as they stand. Nothing moves where views `are_apart`.
     """
     if are_apart(poses.fit_pose[trained, 0]):
-        return False
+        return
     everywhere = carry_to_untrained(poses, trained)
     poses.pose[:], poses.transl[:] = everywhere.pose, everywhere.transl
-    with opened as equations:
-        corrections = Corrections(poses, gaussians, equations, MIDWAY_SHARE)
-        for _ in range(MIDWAY_ROUNDS):
-            corrections.solve()
+    Corrections(poses, gaussians, equations, MIDWAY_SHARE).solve()
     poses.settle()
-    return True
 
 
 class FrameEquations:

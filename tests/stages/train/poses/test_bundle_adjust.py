@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from gsac.avatar import rotation
-from gsac.avatar.artifacts import Clip
-from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.joints import BODY
 from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
@@ -14,20 +12,9 @@ from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.initial_gaussians import init_gaussians
 from gsac.stages.train.fast.trainer import Step, Trainer
 from gsac.stages.train.poses import bundle_adjust, photometric
-from gsac.stages.train.poses.poses import Poses, carry_to_untrained
-from gsac.stages.train.task import Task
-from gsac.stages.train.views import person_crop, read_views
-
-TRUE_SHIFT = 0.03
-"""m by which conftest's fit stands too far right."""
-
-
-def task_of(made, held=()):
-    params = BodyParams.read(made.inputs["smplx/body.npz"])
-    clip = Clip.read(made.inputs["split/clip.json"])
-    views, _ = read_views(made.inputs["split/frames"], made.inputs["segment/alpha"], params.camera(clip.width, clip.height), 128)
-    trained = np.setdiff1d(np.arange(params.frames), held)
-    return Task(views, trained, np.array(held, int), Poses(Body.load(), params), made.config, lambda *a: None)
+from gsac.stages.train.poses.poses import carry_to_untrained
+from gsac.stages.train.views import person_crop
+from support.train_task import TRUE_SHIFT, task_of
 
 
 def half_error(gaussians, poses, t, view, workspace):
@@ -109,7 +96,8 @@ def test_rounds_in_the_midst_correct_held_out_frames_too_and_become_the_base_of_
     for step, t in enumerate(np.tile(task.trained, 6)):
         trainer.learn([Step(int(t), views[int(t)], 0.3, np.ones(3), step)])
     poses.transl[:, 0] += TRUE_SHIFT / 2
-    bundle_adjust.correct_midway(poses, task.trained, trainer.gaussians, Cpu().open_equations(task, trainer.gaussians(), views))
+    with Cpu().open_equations(task, trainer.gaussians(), views) as equations:
+        bundle_adjust.correct_midway(poses, task.trained, trainer.gaussians, equations)
     off = np.abs(poses.transl[:, 0]) / (TRUE_SHIFT / 2)
     assert off.max() < 0.9 and off[task.choosing].mean() < 0.85, "they are taken to be off by little, and so move little"
     np.testing.assert_array_equal(poses.base_transl, poses.transl)

@@ -1,0 +1,40 @@
+"""Each frame's own error late in a training: Gauss-Newton steps of every pose to its own image, the avatar held still.
+
+`bundle_adjust` takes what all frames share and what is smooth in time out of the poses, and holds each frame's own part, which an
+avatar that is still soft tells badly. As it sharpens it tells that part, too, but of a clip of 60 frames Adam gives a pose one
+step in 60.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gsac.avatar import rotation
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import BODY
+from gsac.stages.train.finite import require_finite
+from gsac.stages.train.poses.bundle_adjust import Equations
+from gsac.stages.train.poses.photometric import CORRELATED, TURNING
+from gsac.stages.train.poses.poses import Poses, carry_to_untrained
+
+TURN, SHIFT = 0.004, 0.0013
+"""rad and m, sigma of what a step corrects: limbs that the image hardly tells of stay."""
+
+
+def correct_each(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaussians], equations: Equations) -> None:
+    """Takes one step of each trained frame, carries it to the frames between them, and makes the poses as they stand the new base.
+
+    trained: (n,) indices of frames; gaussians: returns them as they stand.
+    """
+    held = np.diag(np.append(np.full(3 * TURNING, TURN**-2), np.full(3, SHIFT**-2)))
+    for t, normal in equations(gaussians()):
+        known = 1 / (max(normal.error / max(4 * normal.pixels, 1), 1e-5) * CORRELATED)
+        move = np.linalg.solve(known * normal.hessian + held, -known * normal.gradient)
+        require_finite("late in the training", {f"correction of frame {t}'s pose": move})
+        poses.pose[t, BODY] = rotation.log(rotation.exp(poses.pose[t, BODY]) @ rotation.exp(move[:-3].reshape(TURNING, 3)))
+        poses.transl[t] += move[-3:]
+    everywhere = carry_to_untrained(poses, trained)
+    poses.pose[:], poses.transl[:] = everywhere.pose, everywhere.transl
+    poses.settle()
