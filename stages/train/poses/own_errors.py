@@ -14,10 +14,11 @@ import numpy as np
 from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY
+from gsac.stages.train.choose_heldout import carry_corrections
 from gsac.stages.train.finite import require_finite
 from gsac.stages.train.poses.bundle_adjust import Equations
-from gsac.stages.train.poses.photometric import CORRELATED, TURNING
-from gsac.stages.train.poses.poses import Poses, carry_to_untrained
+from gsac.stages.train.poses.photometric import CORRELATED, TURNING, UNKNOWNS
+from gsac.stages.train.poses.poses import Poses
 
 TURN, SHIFT = 0.004, 0.0013
 """rad and m, sigma of what a step corrects: limbs that the image hardly tells of stay."""
@@ -29,12 +30,14 @@ def correct_each(poses: Poses, trained: np.ndarray, gaussians: Callable[[], Gaus
     trained: (n,) indices of frames; gaussians: returns them as they stand.
     """
     held = np.diag(np.append(np.full(3 * TURNING, TURN**-2), np.full(3, SHIFT**-2)))
+    moves = np.zeros((len(poses.pose), UNKNOWNS))
     for t, normal in equations(gaussians()):
         known = 1 / (max(normal.error / max(4 * normal.pixels, 1), 1e-5) * CORRELATED)
-        move = np.linalg.solve(known * normal.hessian + held, -known * normal.gradient)
-        require_finite("late in the training", {f"correction of frame {t}'s pose": move})
-        poses.pose[t, BODY] = rotation.log(rotation.exp(poses.pose[t, BODY]) @ rotation.exp(move[:-3].reshape(TURNING, 3)))
-        poses.transl[t] += move[-3:]
-    everywhere = carry_to_untrained(poses, trained)
-    poses.pose[:], poses.transl[:] = everywhere.pose, everywhere.transl
+        moves[t] = np.linalg.solve(known * normal.hessian + held, -known * normal.gradient)
+        require_finite("late in the training", {f"correction of frame {t}'s pose": moves[t]})
+    turns = rotation.exp(moves[:, :-3].reshape(-1, TURNING, 3))
+    poses.pose[:, BODY] = rotation.log(rotation.exp(poses.pose[:, BODY]) @ turns)
+    poses.transl += moves[:, -3:]
+    is_trained = np.isin(np.arange(len(moves)), trained)
+    poses.pose, poses.transl = carry_corrections(poses.base_pose, poses.base_transl, poses.pose, poses.transl, is_trained)
     poses.settle()

@@ -92,5 +92,5 @@ def test_equations_that_are_not_finite_name_the_frame(job):
 @pytest.mark.parametrize("device", ["cpu", "cuda"])
 def test_poses_are_corrected_together_first_and_never_where_no_round_is_asked_for(job, device):
     steps = correction_steps(job().config, 1200, device, 2)
-    assert steps == sorted(set(steps)) and all(step % 2 == 0 for step in steps) and 0 < steps[0] and steps[-1] < 1200
+    assert steps == sorted(set(steps)) and all(step % 2 == 0 for step in steps) and steps[0] > 0 and steps[-1] < 1200
     assert correction_steps(job(name="without", pose_rounds=0).config, 1200, device) == []
