@@ -163,7 +163,8 @@ def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_
     assert abs(quality - target) < 0.3
 
 
-def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, monkeypatch):
+@pytest.mark.parametrize("late", [(), (0.3, 0.6)], ids=["together", "each"])
+def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, monkeypatch, late):
     from gsac.benchmarks.gpu.check import relative
     from gsac.stages.train.fast import schedule
     from gsac.stages.train.fast.cpu import Cpu
@@ -171,6 +172,7 @@ def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, m
     from gsac.stages.train.judge.heldout import judge
 
     monkeypatch.setattr(schedule, "MIDWAY", 0.1)  # the CPU still sees half the size then, as of a large person
+    monkeypatch.setattr(schedule, "LATE", {"cpu": late, "cuda": late})
     found = []
     for backend in (Cuda(), Cpu()):
         task = turning((5,), steps=300, gaussians=2000)
