@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gsac.avatar import rotation
 from gsac.avatar.cuda import why_not
 
 pytestmark = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
@@ -143,11 +144,13 @@ def test_rounds_that_move_the_poses_end_as_with_the_cpus_learning(one_at_a_time)
         assert np.linalg.norm(expected) > 1e-3 and relative(got, expected) < 0.1
 
 
-def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_cpus():
+def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_cpus(monkeypatch):
+    from gsac.stages.train.fast import schedule
     from gsac.stages.train.fast.cpu import Cpu
     from gsac.stages.train.fast.cuda import Cuda
     from gsac.stages.train.judge.heldout import judge
 
+    monkeypatch.setattr(schedule, "LATE", dict.fromkeys(schedule.LATE, (0.45, 0.6, 0.75)))
     found = []
     for backend in (Cuda(), Cpu()):
         task = turning(size=(160, 240), steps=300, gaussians=3000)
@@ -163,8 +166,7 @@ def test_what_no_frame_shows_is_laid_and_rests_and_the_avatar_is_as_good_as_the_
     assert abs(quality - target) < 0.3
 
 
-@pytest.mark.parametrize("late", [(), (0.3, 0.6)], ids=["together", "each"])
-def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, monkeypatch, late):
+def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, monkeypatch):
     from gsac.benchmarks.gpu.check import relative
     from gsac.stages.train.fast import schedule
     from gsac.stages.train.fast.cpu import Cpu
@@ -172,7 +174,7 @@ def test_poses_of_all_frames_are_corrected_midway_as_on_the_cpu(one_at_a_time, m
     from gsac.stages.train.judge.heldout import judge
 
     monkeypatch.setattr(schedule, "MIDWAY", 0.1)  # the CPU still sees half the size then, as of a large person
-    monkeypatch.setattr(schedule, "LATE", {"cpu": late, "cuda": late})
+    monkeypatch.setattr(schedule, "LATE", {"cpu": (), "cuda": ()})
     found = []
     for backend in (Cuda(), Cpu()):
         task = turning((5,), steps=300, gaussians=2000)
@@ -209,3 +211,24 @@ def test_the_poses_equations_are_the_cpus_as_gaussians_surface_and_poses_move_an
             poses.transl += random.normal(0, 0.01, poses.transl.shape)
             poses.offset += np.float32(random.normal(0, 0.002, poses.offset.shape))
             gaussians.mu += np.float32(random.normal(0, 0.2, gaussians.mu.shape))
+
+
+def test_single_frames_are_corrected_as_on_the_cpu():
+    from gsac.benchmarks.gpu.check import relative
+    from gsac.stages.train.fast.cpu import Cpu
+    from gsac.stages.train.fast.cuda import Cuda
+    from gsac.stages.train.fast.initial_gaussians import init_gaussians
+    from gsac.stages.train.poses.own_errors import correct_each
+
+    moved = []
+    for backend in (Cuda(), Cpu()):
+        task = turning((5,), size=(101, 130))
+        poses, views = task.poses, {int(t): task.views[int(t)] for t in task.trained}
+        gaussians = init_gaussians(task, views, 2500)
+        with backend.open_equations(task, gaussians, views) as equations:
+            correct_each(poses, task.trained, lambda gaussians=gaussians: gaussians, equations)
+        turns = rotation.exp(poses.pose) @ rotation.exp(poses.fit_pose).swapaxes(-1, -2)
+        moved.append((rotation.log(turns), poses.transl - poses.fit_transl))
+    (turns, shifts), (expected_turns, expected_shifts) = moved
+    assert np.abs(expected_shifts[task.trained]).max() > 1e-4
+    assert relative(turns, expected_turns) < 0.01 and relative(shifts, expected_shifts) < 0.01
