@@ -103,7 +103,7 @@ class TrainConfig:
     opacity_rate: float = 3e-2
     """Adam rate of the opacity logits."""
     pose_rounds: int = 3
-    """Rounds of Gauss-Newton that align all poses to small images before the steps (fast); 0: none, and none midway."""
+    """Rounds of Gauss-Newton that align all poses to small images before the steps (fast); 0: none, and none later."""
     pose_rate: float = 2e-3
     """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; the hands have a tenth of it."""
     pose_pull: float = 1e-4
