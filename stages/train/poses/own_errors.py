@@ -1,8 +1,8 @@
 """Each frame's own error late in a training: Gauss-Newton steps of every pose to its own image, the avatar held still.
 
 `bundle_adjust` takes what all frames share and what is smooth in time out of the poses, and holds each frame's own part, which an
-avatar that is still soft tells badly. As it sharpens it tells that part, too, but of a clip of 60 frames Adam gives a pose one
-step in 60.
+avatar that is still soft tells badly. As it sharpens it tells that part, too, but in a clip of 60 frames Adam moves a pose in one
+step of 60.
 """
 
 from __future__ import annotations
