@@ -20,6 +20,8 @@ class FakeDriver:
 
     def __init__(self):
         self.memory, self.launched, self.scene, self.waiting = {}, [], None, False
+        self.graphs = {}
+        """Number of a graph -> the scene that its kernels were recorded with."""
 
     def call(self, name, *arguments):
         if act := getattr(self, name, None):
@@ -56,8 +58,12 @@ class FakeDriver:
         self.waiting = True
         assert all(getattr(self.scene, name) in {*self.memory, None, 0} for name in structs.POINTERS), "kernels get live memory"
 
+    def cuGraphInstantiate(self, captured, flags):  # noqa: N802
+        self.graphs[len(self.graphs) + 1] = self.scene
+        return len(self.graphs)
+
     def cuGraphLaunch(self, graph, stream):  # noqa: N802
-        self.waiting = True
+        self.scene, self.waiting = self.graphs[graph], True
 
     def cuStreamSynchronize(self, stream):  # noqa: N802
         if not self.waiting:
