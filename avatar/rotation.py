@@ -42,6 +42,11 @@ def log_derivative(rotvec: np.ndarray) -> np.ndarray:
     return np.eye(3) + 0.5 * k + b * (k @ k)
 
 
+def by_turns(rotvec: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Gradient (..., 3) by a turn about the axes after the rotation. rotvec: (..., 3) rad; gradient: (..., 3), by rotvec."""
+    return np.einsum("...ba,...b->...a", log_derivative(rotvec), gradient)
+
+
 def align(source: np.ndarray, target: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
     """Rotation (3, 3) that best turns centred source (P, 3) onto centred target (P, 3); weight: (P,), one unless given (Kabsch)."""
     w = np.ones(len(source)) if weight is None else weight

@@ -51,12 +51,14 @@ class PoseEquations(CudaTrainer):
         order = np.arange(self.frames, dtype=np.int32)[:, None]
         return DrawnPlan(order, np.zeros((self.frames, 1, 3), np.float32), zero_rates(self.frames))
 
-    def measure(self, gaussians: Gaussians, pose: np.ndarray, transl: np.ndarray, offset: np.ndarray) -> Measured:
+    def measure(self, gaussians: Gaussians, pose: np.ndarray, transl: np.ndarray, offset: np.ndarray,
+                joints: np.ndarray) -> Measured:
         """Of all frames. gaussians: those that the trainer was opened with, as they stand now; pose: (T, 55, 3) rad; transl: (T, 3)
-        m; offset: (V, 3) m, added to the body's vertices at rest.
+        m; offset: (V, 3) m, added to the body's vertices at rest; joints: (55, 3) m at rest.
         """
         self.replace(gaussians)
         self.buffers["offset"].write(offset)
+        self.buffers["joints"].write(joints)
         self.place(pose, transl)
         self._set_state(step=0)
         self.train(self.frames)

@@ -19,7 +19,7 @@ from gsac.stages.train.fast.schedule import OFFSET_SHARE, correction_steps, pers
 from gsac.stages.train.fast.trainer import AT_ONCE, Step, Trainer
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import Equations, FrameEquations, correct_midway
-from gsac.stages.train.poses.own_errors import correct_each
+from gsac.stages.train.poses.own_errors import correct_each, newton_steps
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, Views, of_each
@@ -51,9 +51,7 @@ class Cpu(Backend):
         corrections = correction_steps(config, steps, self.device, AT_ONCE)
         for step in range(first, steps, AT_ONCE):
             if step in corrections:
-                with self.open_equations(task, trainer.gaussians(), coarse if step < coarse_until else fine) as equations:
-                    correct = correct_midway if step == corrections[0] else correct_each
-                    correct(task.poses, task.trained, trainer.gaussians, equations)
+                self.correct(task, trainer, coarse if step < coarse_until else fine, together=step == corrections[0])
             if trainer.offsets and step / steps >= OFFSET_SHARE:
                 trainer.fold_offsets()
                 trainer.lay_unseen(coarse)
@@ -98,6 +96,15 @@ class Cpu(Backend):
         trainer.free_buffers()
         trainer.values = {name: (total / averaged).astype(np.float32) for name, total in sums.items()}
         return trainer
+
+    def correct(self, task: Task, trainer: Trainer, views: dict[int, View], together: bool) -> None:
+        """Corrects the poses of all frames together, or each by itself, whose next steps then go on by its Hessian."""
+        with self.open_equations(task, trainer.gaussians(), views) as equations:
+            if together:
+                correct_midway(task.poses, task.trained, trainer.gaussians, equations)
+            else:
+                inverses = correct_each(task.poses, task.trained, trainer.gaussians, equations)
+                task.poses.newton = newton_steps(inverses, views)
 
     @contextmanager
     def open_rounds(self, task: Task, views: dict[int, View], gaussians: Gaussians, plan: list[Round]) -> Iterator[Rounds]:

@@ -56,15 +56,16 @@ class Cuda(Backend):
         steps = task.config.steps or FAST_STEPS["cuda"]
         recipe = make_recipe(task.config, count, coarse_share=coarse_steps(schedule.person_pixels(task), steps) / steps,
                              least=schedule.shortest_axis(task), **lpips_options(task))
-        with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer:
-            self.train_correcting(trainer, task, coarse, math.ceil(recipe.offset_share * recipe.steps))
+        with (open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer,
+              self.open_equations(task, gaussians, coarse) as equations):
+            self.train_correcting(trainer, task, equations, math.ceil(recipe.offset_share * recipe.steps))
             body = trainer.body
             folded = cloth_offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
             task.poses.offset = np.zeros_like(task.poses.offset)
             middle = Trainer(folded, task, frozen_body=True)
             middle.lay_unseen(coarse)
             trainer.replace(middle.gaussians(), ~middle.seen, middle.reach)
-            self.train_correcting(trainer, task, coarse, recipe.steps)
+            self.train_correcting(trainer, task, equations, recipe.steps)
             hand_back(trainer, task)
             kept = take_over(trainer, task)
             kept.seen = middle.seen
@@ -109,15 +110,14 @@ class Cuda(Backend):
             yield CudaEquations(trainer, task.poses, frames)
             task.gpu_seconds += trainer.seconds
 
-    def train_correcting(self, trainer: CudaTrainer, task: Task, views: dict[int, View], until: int) -> None:
-        """Trains up to a step, and corrects the poses on the way where `Cpu.train` does, by views of half the size."""
+    def train_correcting(self, trainer: CudaTrainer, task: Task, equations: Equations, until: int) -> None:
+        """Trains up to a step, and corrects the poses on the way where `Cpu.train` does. equations: of views of half the size."""
         poses, trained = task.poses, task.trained
         for number, step in enumerate(schedule.correction_steps(task.config, trainer.recipe.steps, self.device)):
             if trainer.state().step < step <= until:
                 train_until(trainer, task, step)
                 correct = own_errors.correct_each if number else bundle_adjust.correct_midway
-                with self.open_equations(task, trainer.gaussians(), views) as equations:
-                    correct(poses, trained, trainer.gaussians, equations)
+                correct(poses, trained, trainer.gaussians, equations)
                 trainer.place(poses.pose[trained], poses.transl[trained])
         train_until(trainer, task, until)
 
@@ -149,15 +149,16 @@ class CudaRounds(Rounds):
 
 
 class CudaEquations:
-    """`bundle_adjust.Equations` of the frames that a PoseEquations holds, (n,) indices."""
+    """`bundle_adjust.Equations` of the frames that a PoseEquations holds, (n,) indices; it keeps the expressions of its start."""
 
     def __init__(self, trainer: PoseEquations, poses: Poses, frames: np.ndarray):
         self._trainer, self._poses, self._frames, self._worn = trainer, poses, frames, poses.offset.copy()
 
     def __call__(self, gaussians: Gaussians) -> list[tuple[int, NormalEquations]]:
         poses, frames = self._poses, self._frames
-        found = self._trainer.measure(gaussians, poses.pose[frames], poses.transl[frames], poses.offset - self._worn)
-        turns = np.einsum("tjba,tjb->tja", rotation.log_derivative(poses.pose[frames][:, BODY]), found.gradient[:, BODY])
+        found = self._trainer.measure(gaussians, poses.pose[frames], poses.transl[frames], poses.offset - self._worn,
+                                      poses.rest(int(frames[0]))[1])
+        turns = rotation.by_turns(poses.pose[frames][:, BODY], found.gradient[:, BODY])
         gradients = np.concatenate([turns.reshape(len(frames), -1), found.gradient[:, -1]], 1)
         hessians = CURVATURE * found.hessian.astype(np.float64)
         return [(int(t), NormalEquations(gradient, hessian, float(error), int(pixels))) for t, gradient, hessian, error, pixels

@@ -9,7 +9,7 @@ from gsac.stages.train.task import Task
 
 MIDWAY = 0.3
 """Share of the steps after which the poses of all frames are corrected together once more."""
-LATE = {"cpu": (0.36, 0.44, 0.52, 0.6, 0.68, 0.76), "cuda": (0.45, 0.6, 0.75)}
+LATE = {"cpu": (0.36, 0.48, 0.6, 0.72), "cuda": (0.45, 0.6, 0.75)}
 """Shares of the steps after which each frame's own error is taken out of its pose, by device: of more steps Adam takes out more."""
 OFFSET_SHARE = 0.6
 """Share of the steps, the first, that also displace the body's surface to clothes and hair."""

@@ -114,7 +114,7 @@ def differentiate(found: Residuals, share: np.ndarray, poses: Poses, t: int, vie
     means = found.state.means.copy()
     grads = render_bound_backward(found.state, found.colour, found.mask)
     grad_pose, grad_transl, _, _ = poses.gradients(t, grads.vertices)
-    turns = np.einsum("jba,jb->ja", rotation.log_derivative(poses.pose[t, BODY]), grad_pose[BODY])
+    turns = rotation.by_turns(poses.pose[t, BODY], grad_pose[BODY])
     tensors = render_backward(found.state, found.slope, np.zeros_like(found.mask)).rgb
     used = np.flatnonzero(tensors[:, 0] + tensors[:, 2] > FLAT)
     rows = np.empty((2 * len(used), UNKNOWNS), np.float32)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams, split_pose
 from gsac.avatar.correctives import move_rest_backward
 from gsac.avatar.joints import BODY, JAW, JAW_EYES
@@ -14,6 +15,7 @@ from gsac.avatar.skinning import joint_transforms, skin_backward
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.choose_heldout import carry_corrections
 from gsac.stages.train.poses.interpolate import follow_neighbours
+from gsac.stages.train.poses.newton import NewtonSteps
 
 HAND_SHARE = 0.1
 """Rate of the fingers relative to the body's: images constrain them weakly."""
@@ -84,10 +86,13 @@ class Poses:
         self.joint_share = self.share.copy()
         self.joint_share[0] = 0  # the pelvis is where the translation puts it
         self.betas = np.array(params.betas, np.float64)
+        self.newton: dict[int, NewtonSteps] = {}
+        """Frame -> its steps of pelvis, body joints and transl, once they are known; until then, and for the fingers, Adam's."""
 
     def copy(self) -> Poses:
-        """An independent copy; Adam starts anew."""
+        """An independent copy; steps start anew."""
         other = copy.copy(self)
+        other.newton = {}
         other.pose, other.transl = self.pose.copy(), self.transl.copy()
         other.moments, other.count = np.zeros_like(self.moments), np.zeros_like(self.count)
         other.expression_moments = np.zeros_like(self.expression_moments)
@@ -95,12 +100,13 @@ class Poses:
 
     def state(self) -> State:
         """All that training changes, for a checkpoint."""
-        return {name: getattr(self, name) for name in KEPT}
+        return {name: getattr(self, name) for name in KEPT} | {"newton": {str(t): vars(steps) for t, steps in self.newton.items()}}
 
     def restore(self, state: State) -> None:
         """Takes the place of the Poses that `state` was called on."""
         for name in KEPT:
             setattr(self, name, state[name])
+        self.newton = {int(t): NewtonSteps(**steps) for t, steps in state["newton"].items()}
         self.forget_rests()
 
     def forget_rests(self) -> None:
@@ -158,15 +164,24 @@ class Poses:
         return grad_pose, grad_transl, grad_rest, grad_joints
 
     def step(self, t: int, grad_vertices: np.ndarray, rate: float, pull: float) -> tuple[np.ndarray, np.ndarray]:
-        """One Adam step of frame t. grad_vertices: (V, 3). Returns the gradients of rest vertices (V, 3) and joints (55, 3)."""
+        """One step of frame t. grad_vertices: (V, 3). Returns the gradients of rest vertices (V, 3) and joints (55, 3).
+
+        rate: Adam's; 0: the pose stays; pull: weight of the squared distance from the base, for Adam.
+        """
         grad_pose, grad_transl, grad_rest, grad_joints = self.gradients(t, grad_vertices)
         grad = np.concatenate([grad_pose, grad_transl[None]]).astype(np.float64)
         grad[:-1] += 2 * pull * (self.pose[t] - self.base_pose[t]) / TURN**2
         grad[-1] += 2 * pull * (self.transl[t] - self.base_transl[t]) / SHIFT**2
         self.count[t] += 1
         move = adam_move(self.moments[:, t], self.count[t], grad, rate)
-        self.pose[t] -= self.share * move[:-1]
-        self.transl[t] -= move[-1]
+        turn, shift = self.share * move[:-1], move[-1]
+        if rate and t in self.newton:
+            by_turns = rotation.by_turns(self.pose[t, BODY], grad_pose[BODY])
+            taken = self.newton[t].step(np.append(by_turns, grad_transl))
+            self.pose[t, BODY] = rotation.log(rotation.exp(self.pose[t, BODY]) @ rotation.exp(taken[:-3].reshape(-1, 3)))
+            turn[BODY], shift = 0, -taken[-3:]
+        self.pose[t] -= turn
+        self.transl[t] -= shift
         return grad_rest, grad_joints
 
     def shape_gradient(self, grad_rest: np.ndarray, grad_joints: np.ndarray) -> np.ndarray:

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from gsac.avatar import rotation
+from gsac.avatar.joints import BODY
 from gsac.stages.contract import StageError
 from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.initial_gaussians import init_gaussians
 from gsac.stages.train.fast.schedule import correction_steps
-from gsac.stages.train.fast.trainer import Step, Trainer
-from gsac.stages.train.poses.own_errors import SHIFT, correct_each
+from gsac.stages.train.fast.trainer import Room, Step, Trainer
+from gsac.stages.train.poses.newton import SHARE
+from gsac.stages.train.poses.own_errors import SHIFT, correct_each, newton_steps
 from gsac.stages.train.poses.photometric import UNKNOWNS, NormalEquations
 from gsac.stages.train.views import person_crop
 from support.train_task import TRUE_SHIFT, task_of
@@ -80,6 +82,33 @@ def test_an_unsure_image_moves_a_frame_by_little(job):
 
     correct_each(task.poses, task.trained, lambda: None, equations)
     assert task.poses.transl[0, 0] - before.transl[0, 0] == pytest.approx(0.05)
+
+
+def test_a_step_of_the_training_takes_a_share_of_a_gauss_newton_step(job):
+    task = task_of(job(ssim=0, mask=1 / 3), held=(3, 8))  # with these, the loss is the equations' error
+    trainer, views = trained_avatar(task)
+    poses, at = task.poses, int(task.trained[2])
+    poses.transl[at, 0] += OFF
+    with Cpu().open_equations(task, trainer.gaussians(), views) as equations:
+        alone = {t: normal for t, normal in equations(trainer.gaussians()) if t == at}
+        inverses = correct_each(poses.copy(), np.array([at]), trainer.gaussians, lambda gaussians: list(alone.items()))
+    poses.newton = newton_steps(inverses, views)
+    expected = -SHARE * inverses[at] @ alone[at].gradient
+    before = poses.copy()
+    grads = trainer.gradients(Step(at, views[at], 0.8, np.zeros(3), 0), Room.open())
+    poses.step(at, grads.vertices, task.config.pose_rate, 0.0)
+    np.testing.assert_allclose(poses.transl[at] - before.transl[at], expected[-3:], rtol=0.02, atol=1e-7)
+    turns = rotation.log(np.swapaxes(rotation.exp(before.pose[at, BODY]), 1, 2) @ rotation.exp(poses.pose[at, BODY]))
+    np.testing.assert_allclose(turns.ravel(), expected[:-3], rtol=0.02, atol=2e-6)
+    assert abs(expected[-3]) > 0.01 * OFF
+
+
+def test_a_step_is_the_same_at_any_size_of_the_images(job):
+    whole = {0: person_crop(task_of(job(frames=3)).views[0])}
+    half = {0: whole[0].halved()}
+    of_whole, of_half = (np.diag(newton_steps({0: np.eye(UNKNOWNS)}, views)[0].inverse) for views in (whole, half))
+    larger = whole[0].pixels[..., 0].size / half[0].pixels[..., 0].size
+    assert of_whole / of_half == pytest.approx(larger), "the loss is a mean over the pixels, the equations are a sum"
 
 
 def test_equations_that_are_not_finite_name_the_frame(job):
