@@ -105,7 +105,8 @@ class TrainConfig:
     pose_rounds: int = 3
     """Rounds of Gauss-Newton that align all poses to small images before the steps (fast); 0: none, and none later."""
     pose_rate: float = 2e-3
-    """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; the hands have a tenth of it."""
+    """Adam rate of orientation, body pose (rad) and translation (m), falls to a hundredth; the hands have a tenth of it. On the CPU
+    late steps go by the frame's Hessian instead, but for the hands (fast). 0: no step moves a pose."""
     pose_pull: float = 1e-4
     """Weight of the squared distance of a refined pose from its start, in units of 0.05 rad and 2 cm."""
     expression_rate: float = 0.0

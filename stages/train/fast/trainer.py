@@ -4,8 +4,9 @@ Two steps are worked out side by side, both from the gaussians as they stand, th
 to keep several cores busy with one, and a gradient that is late by one step teaches the same.
 
 One gaussian budget from the start, no densification; half the size first; rates that decay; all poses corrected together before
-the steps (`prealign`) and midway (`bundle_adjust`). Gaussians are limited after every step instead of being penalised in the loss:
-no needle, no giant and no floater can arise, whatever the weights.
+the steps (`prealign`) and midway (`bundle_adjust`), each by itself from then on (`own_errors`, `newton`). Gaussians
+are limited after every step instead of being penalised in the loss: no needle, no giant and no floater can arise, whatever the
+weights.
 """
 
 from __future__ import annotations
