@@ -30,7 +30,8 @@ class SmplxConfig:
     """Name under which `gsac models add NAME FILE.npz` keeps the systematic errors of the detector that you brought, as
     `tools/detector_offsets.py` measures them, or none: those of the embedded detector are known, of others none."""
     height_m: float | None = None
-    """Height of the person, m; fixes the scale, which one camera cannot see. null: the shape prior gives the scale."""
+    """Height of the person, m; fixes the scale, which one camera cannot see. null: 1.72 m is assumed, which costs taller and
+    shorter people their proportions, and the avatar its looks in poses that the clip does not show."""
     focal_px: float | None = None
     """Focal length, px of the frames as split cut and scaled them, of a clip that does not carry it. null: estimated."""
     rounds: int = 2
