@@ -129,7 +129,7 @@ def describe_guesses(config: SmplxConfig, params: BodyParams, clip: Clip) -> str
     """One sentence on what of height and focal length was guessed and how to fix it; empty where both are known."""
     found = []
     if config.height_m is None:
-        found.append("the person's height from the shape prior (`--height 1.78`, smplx.height_m, fixes it and the proportions)")
+        found.append("the person's height from the shape prior (`--height 1.78`, smplx.height_m, fixes it, and proportions follow)")
     if not clip.focal_px and not config.focal_px:
         found.append(f"the focal length, {params.focal[0]:.0f} px, from the points (smplx.focal_px)")
     return f"Estimated: {' and '.join(found)}." if found else ""
