@@ -10,7 +10,7 @@ from pathlib import Path
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Executor
 from gsac.pipeline.run_folder import avatar_name
 from gsac.stages.contract import BadInput
-from gsac.stages.split.film import find_film
+from gsac.stages.split.film import MASKS, find_film
 
 VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".ts", ".mpg", ".mpeg")
 PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff", ".heic", ".heif")
@@ -39,9 +39,10 @@ def find_clips(source: Path) -> list[Path]:
 
 
 def is_clip(path: Path) -> bool:
-    """A video by its ending, or a folder with photos in it, or with one video and its masks or plate."""
+    """A video by its ending, or a folder with photos in it, or with one video and its masks or plate: one alone may be a result."""
     if path.is_dir():
-        return any(photo.suffix.lower() in PHOTOS for photo in path.iterdir()) or find_film(path) is not None
+        return (any(photo.suffix.lower() in PHOTOS for photo in path.iterdir())
+                or find_film(path) is not None and (path / MASKS).is_dir())
     return path.suffix.lower() in VIDEOS
 
 

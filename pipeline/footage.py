@@ -54,7 +54,7 @@ def footage_of_result(frames: Path | None, clip: Path | None) -> Footage | None:
 
 
 def expect_footage(clip: Path, split: Any) -> Footage:
-    """What split will keep of a clip: a video, a folder of photos, or one of a video with masks or plate.
+    """What split will keep of a clip: a video, a folder of photos, or one with a video.
 
     split: its config, or None.
     """

@@ -9,7 +9,7 @@ from pathlib import Path
 from gsac.cache.roots import find_links, object_of
 from gsac.pipeline.quality import STANDARD, name_of
 from gsac.pipeline.rows import read_json
-from gsac.pipeline.run_folder import DAG, RUN, RunFolder
+from gsac.pipeline.run_folder import DAG, PARAMS, RUN, RunFolder
 from gsac.stages.contract import BadInput
 
 
@@ -29,11 +29,12 @@ def require_file(path: Path) -> None:
 
 
 def recovery(path: Path) -> str:
-    """The command that makes the results of the folder around `path` again."""
+    """The command that makes the results of the folder around `path` again, by the folder's own parameters."""
     root = next((folder for folder in path.absolute().parents if (folder / DAG).is_file()), None)
     if root is None:
         return "gsac run CLIP"
     clip, run = RunFolder(root).clip, read_json(root / RUN)
     quality = name_of(run.get("quality")) if isinstance(run, dict) else ""
     return shlex.join(["gsac", "run", str(clip.resolve()) if clip.exists() else "CLIP", "--out", str(root),
-                       *(["--quality", quality] if quality not in ("", STANDARD) else [])])
+                       *(["--quality", quality] if quality not in ("", STANDARD) else []),
+                       *(["--params", str(root / PARAMS)] if (root / PARAMS).is_file() else [])])

@@ -1,4 +1,4 @@
-"""The video of a folder that holds one beside its masks or its plate, told by names: nothing is opened."""
+"""The video of a folder that holds one, alone or beside its masks or its plate, told by names: nothing is opened."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ MASKS = "masks"
 
 
 def find_film(folder: Path) -> Path | None:
-    """None where the folder has neither masks nor a plate without photos, or not exactly one video."""
+    """None where the folder has photos without masks, or not exactly one video."""
     if not folder.is_dir():
         return None
     files = [file for file in folder.iterdir() if not file.name.startswith(".")]
     photos = {file.stem.lower() for file in files if file.suffix.lower() in PHOTO_SUFFIXES}
-    if not (folder / MASKS).is_dir() and photos != {PLATE}:
+    if photos - {PLATE} and not (folder / MASKS).is_dir():
         return None
     videos = [file for file in files if file.suffix.lower() in VIDEO_SUFFIXES]
     return videos[0] if len(videos) == 1 else None

@@ -1,6 +1,7 @@
 """Where the cache, the current folder or a path is gone, a command says so in one line and harms nothing."""
 
 import os
+import shlex
 import shutil
 import subprocess
 
@@ -100,6 +101,18 @@ def test_a_real_run_brings_lost_files_back(toy):
     shutil.rmtree(toy.cache, ignore_errors=True)
     assert (toy.out / "export" / "out.txt").read_text() == "ALPHA ALPHA" and not os.path.exists(toy.out / "cut" / "words")
     done = toy.gsac("report", toy.out)
-    assert done.code == 2 and f"`gsac run {toy.clip} --out {toy.out}` brings them back" in done.err
+    command = f"gsac run {toy.clip} --out {toy.out} --params {toy.out / 'params.yaml'}"
+    assert done.code == 2 and f"`{command}` brings them back" in done.err
     assert toy.ran() == ["cut", "left", "right", "export"] and toy.gsac("report", toy.out).code == 0
     assert [path.name for path in (toy.out / "export").iterdir() if "kept" in path.name] == []
+
+
+def test_the_command_that_is_told_brings_back_what_the_runs_own_parameters_made(toy):
+    toy.call_last_stage_export()
+    assert toy.run("--set", "left.word=last").code == 0
+    before = (toy.out / "export" / "out.txt").read_text()
+    subprocess.run(["chmod", "-R", "u+w", toy.cache], check=True)
+    shutil.rmtree(toy.cache)
+    told = toy.gsac("report", toy.out).err.split("`")[1]
+    assert toy.gsac(*shlex.split(told)[1:]).code == 0
+    assert (toy.out / "export" / "out.txt").read_text() == before != "ALPHA ALPHA"

@@ -1,5 +1,6 @@
 """The empty scene beside a video: read, cut and scaled as its frames are."""
 
+import shutil
 import subprocess
 
 import imageio_ffmpeg
@@ -65,6 +66,16 @@ def test_a_plate_of_another_aspect_and_two_plates_are_named(footage, tmp_path):
         split(footage, tmp_path / "out")
     Image.fromarray(scene()).save(footage / "plate.jpg")
     with pytest.raises(BadInput, match="has 2 plates"):
+        split(footage, tmp_path / "again")
+
+
+def test_one_video_alone_in_a_folder_is_the_footage_and_of_two_none_is(footage, tmp_path):
+    (footage / "plate.png").unlink()
+    (footage / "LICENSE").write_text("CC0")
+    split(footage, tmp_path / "out")
+    assert len(frame_paths(tmp_path / "out" / "frames")) == 6
+    shutil.copy(footage / "clip.mkv", footage / "again.mp4")
+    with pytest.raises(BadInput, match="give one of its 2 videos, such as footage/again.mp4"):
         split(footage, tmp_path / "again")
 
 
