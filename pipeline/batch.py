@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -10,10 +11,7 @@ from pathlib import Path
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Executor
 from gsac.pipeline.run_folder import avatar_name
 from gsac.stages.contract import BadInput
-from gsac.stages.split.film import MASKS, find_film
-
-VIDEOS = (".mp4", ".mov", ".m4v", ".mkv", ".webm", ".avi", ".3gp", ".mts", ".ts", ".mpg", ".mpeg")
-PHOTOS = (".jpg", ".jpeg", ".png", ".webp", ".bmp", ".tif", ".tiff", ".heic", ".heif")
+from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, VIDEO_SUFFIXES, find_film
 
 
 def find_clips(source: Path) -> list[Path]:
@@ -24,8 +22,11 @@ def find_clips(source: Path) -> list[Path]:
     if source.is_dir():
         clips = sorted(path for path in source.iterdir() if not path.name.startswith(".") and is_clip(path))
         if not clips:
-            raise BadInput(f"{source}: no clips here; expected videos ({', '.join(VIDEOS)}) or folders of photos")
+            raise BadInput(f"{source}: no clips here; expected videos ({', '.join(sorted(VIDEO_SUFFIXES))}) or folders of photos")
         return clips
+    if source.suffix.lower() in VIDEO_SUFFIXES and source.is_file():
+        raise BadInput(f"{source} is one video: `{shlex.join(['gsac', 'run', str(source)])}` makes its avatar; "
+                       "give a folder of clips or a list of paths")
     try:
         lines = source.read_text().splitlines()
     except FileNotFoundError as e:
@@ -41,9 +42,9 @@ def find_clips(source: Path) -> list[Path]:
 def is_clip(path: Path) -> bool:
     """A video by its ending, or a folder with photos in it, or with one video and its masks or plate: one alone may be a result."""
     if path.is_dir():
-        return (any(photo.suffix.lower() in PHOTOS for photo in path.iterdir())
+        return (any(photo.suffix.lower() in PHOTO_SUFFIXES for photo in path.iterdir())
                 or find_film(path) is not None and (path / MASKS).is_dir())
-    return path.suffix.lower() in VIDEOS
+    return path.suffix.lower() in VIDEO_SUFFIXES
 
 
 def make_jobs(clips: list[Path], out: Path, arguments: tuple[str, ...]) -> list[ClipJob]:

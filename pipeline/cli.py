@@ -19,6 +19,7 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.reporter import Verbosity
 from gsac.pipeline.versions import package_version
 from gsac.pipeline.wrapping import fit
+from gsac.stages.contract import BadInput, did_you_mean
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -52,7 +53,7 @@ def _execute(argv: list[str]) -> ExitCode:
 
 def make_parser(argv: list[str]) -> argparse.ArgumentParser:
     """The parser of this command line: all commands by name, and the arguments of the one that was typed."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="gsac", description="One phone clip of a turning person in, an animatable Gaussian avatar out.")
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     _add_verbosity(parser, default=Verbosity.NORMAL)
@@ -79,6 +80,21 @@ def _add_verbosity(parser: argparse.ArgumentParser, default: Any = argparse.SUPP
     for letter, verbosity in (("q", Verbosity.QUIET), ("v", Verbosity.VERBOSE)):
         both.add_argument(f"-{letter}", f"--{verbosity.value}", dest="verbosity", action="store_const", const=verbosity,
                           default=default, help=verbosity.sentence)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Of the program and, by argparse's own way, of each command: what it does not know it names itself."""
+
+    def parse_known_args(self, *given: Any) -> Any:
+        found, unknown = super().parse_known_args(*given)
+        option = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
+        if option is not None:
+            known = [name[2:] for name in self._option_string_actions if name.startswith("--")]
+            near = did_you_mean(option.lstrip("-"), known, "--")
+            raise BadInput(f"unknown option {option}{near}; `{self.prog} --help` lists them")
+        if unknown:
+            raise BadInput(f"{unknown[0]} is one word too many; `{self.prog} --help` tells what is taken")
+        return found, unknown
 
 
 class _Version(argparse.Action):

@@ -8,7 +8,7 @@ from typing import Any
 
 from gsac.cache.store import Store
 from gsac.pipeline.clip_end import told_clip
-from gsac.pipeline.errors import StageFailedError, attach_summary, exit_code
+from gsac.pipeline.errors import attach_summary, exit_code
 from gsac.pipeline.event_file import kept_events
 from gsac.pipeline.journal import Journal
 from gsac.pipeline.keys import Keys
@@ -16,9 +16,9 @@ from gsac.pipeline.other_clip import find_other_clip, forget_results
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.own_store import writable_store
 from gsac.pipeline.project import Project
-from gsac.pipeline.report.refresh import EarlySections, refresh_report
+from gsac.pipeline.report.refresh import EarlySections, is_outdated, refresh_report
 from gsac.pipeline.run import ClipRun, Options
-from gsac.pipeline.run_folder import OWN_STORE, RunFolder
+from gsac.pipeline.run_folder import OWN_STORE, REPORT, RunFolder
 from gsac.stages.contract import BadInput
 
 MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
@@ -69,8 +69,10 @@ class ClipWork:
             attach_summary(error, clip_run.summary())
             if exit_code(error) in MISTAKES and not clip_run.finished:
                 clip_run.folder.discard()
-            elif isinstance(error, StageFailedError):
+            elif isinstance(error, Exception):
                 self._write_report(clip_run)
+            elif is_outdated(clip_run.folder):  # who interrupts a run does not wait for a drawing
+                self.journal.note(f"{REPORT} is of an earlier run; `gsac report {clip_run.folder.root}` draws it anew")
             raise
 
     def _write_report(self, clip_run: ClipRun, early: EarlySections | None = None) -> None:

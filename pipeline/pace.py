@@ -77,7 +77,7 @@ class Course:
         self._seconds(stage)
 
     def end(self, stage: str, spent: float) -> None:
-        """Notes how long a stage took, s: the later ones are expected to be as much faster or slower than usual."""
+        """Notes how long a stage took, s: the later ones are expected to be faster or slower than usual, too."""
         usual = self._seconds(stage)
         if usual is not None:
             self._usual, self._spent = self._usual + usual, self._spent + spent
@@ -92,7 +92,8 @@ class Course:
         known = [time for time in times if time is not None]
         if len(known) < len(times):
             return None
-        ratio = self._spent / self._usual if self._usual else 1.0
+        usual = sum(known)  # joins both sums, so that a short stage tells little of long ones
+        ratio = (self._spent + usual) / (self._usual + usual) if usual else 1.0
         return max(known[0] * ratio - elapsed, of_phase) + sum(known[1:]) * ratio
 
 

@@ -26,6 +26,7 @@ class Reason(Enum):
     DEVICE = "device changed"
     UPSTREAM = "upstream"
     OUTPUT = "output changed"
+    NOT_SHOWN = "not in the folder"
     LOST = "result lost"
     STOPPED = "stopped before"
 
@@ -46,6 +47,7 @@ _SENTENCES = {
     Reason.DEVICE: "the device class is another",
     Reason.UPSTREAM: "it runs if the result of a stage above changes",
     Reason.OUTPUT: "the output in the folder is not the one in the cache",
+    Reason.NOT_SHOWN: "its result is in the cache, and not all of it in the folder; `gsac run` puts it there",
     Reason.LOST: "its result was there and is no longer in the cache: damaged, or removed",
     Reason.STOPPED: "a run of it was stopped; it goes on from what that left",
 }
@@ -107,6 +109,8 @@ def plan_stage(
     if known:
         return StagePlan(parts.stage, Reason.LOST, parts)
     before = store.previous(parts.stage, parts)
+    if shown is None and before is not None and not before.parts.inputs.items() & parts.inputs.items():
+        before = None  # of another clip: its parameters explain nothing
     changes = before.parts.diff(parts) if before is not None else []
     if not changes:
         return StagePlan(parts.stage, Reason.FIRST_RUN, parts)

@@ -113,6 +113,12 @@ def read_rows(folder: RunFolder) -> dict[str, Row]:
     return rows_of(read_json(folder.root / RUN))
 
 
+def stale_reasons(folder: RunFolder) -> dict[str, str]:
+    """Stage -> why, of the results in the folder that are not up to date."""
+    results = {name: result_row(row) or {} for name, row in read_rows(folder).items()}
+    return {name: str(row.get("stale_reason")) for name, row in results.items() if row.get("stale")}
+
+
 def port_digest(folder: RunFolder, port: str, store: Store) -> str | None:
     """Tree digest of what lies at a port; None where nothing lies there that can be read."""
     path = folder.path(port)

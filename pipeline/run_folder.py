@@ -210,21 +210,20 @@ class RunFolder:
     def refuse_foreign(self, clip: Path, project: Project) -> None:
         """BadInput where the folder is that of the photos, or holds files of another project, which would be overwritten."""
         if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
-            raise BadInput(f"--out {self.root} lies in the folder of the photos, which is left as it is; give --out a "
-                           "folder elsewhere")
+            raise BadInput(f"{self.root} lies in the folder of the photos, which is left as it is; give --out a folder elsewhere")
         if self.root == project.dag.parent:
-            raise BadInput(f"--out {self.root} is where gsac itself lies; choose another folder")
+            raise BadInput(f"{self.root} is where gsac itself lies; choose another --out")
         if (self.root / DAG).exists():
             try:
                 if not is_same_file(self.root / DAG, project.dag):  # as it is nearly always; reading YAML takes long
                     Graph.load(self.root / DAG)
             except BadInput as e:
-                raise BadInput(f"--out {self.root} holds another project's {DAG} ({e}); choose another folder") from e
+                raise BadInput(f"{self.root} holds another project's {DAG} ({e}); choose another --out") from e
             return
         for name in (*project.graph.steps, PARAMS, RUN, METRICS, REPORT, LOGS, EVENTS, OLDER_EVENTS):
             if os.path.lexists(self.root / name):
-                raise BadInput(f"--out {self.root} is not the folder of a run and holds {name}, which would be written "
-                               "over; choose another folder, or move it away")
+                raise BadInput(f"{self.root} is not the folder of a run and holds {name}, which would be written over; "
+                               "choose another --out, or move it away")
 
     def write_json(self, name: str, content: Any) -> None:
         """Writes one of the folder's own files as JSON."""

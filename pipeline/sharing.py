@@ -78,9 +78,12 @@ class Sharing:
         self._stopped = False
         self._uploader: threading.Thread | None = None
 
-    def fetch(self, parts: KeyParts, outputs: Collection[str]) -> Record | None:
-        """The shared result of a key that is not here, put into the store; None where there is none to be had now."""
-        with single_flight(self.store, parts.key, lambda: None, outputs) as there:
+    def fetch(self, parts: KeyParts, outputs: Collection[str], waiting: Callable[[], None]) -> Record | None:
+        """The shared result of a key that is not here, put into the store; None where there is none to be had now.
+
+        waiting: called once if another run here is at work on the key.
+        """
+        with single_flight(self.store, parts.key, waiting, outputs) as there:
             return there or self._try(lambda: self._fetch(parts, outputs))
 
     @contextlib.contextmanager

@@ -121,7 +121,8 @@ class StageRunner:
 
     def fetch(self, parts: KeyParts) -> bool:
         """Whether another machine's result of the key, which is not here, has been put into the store."""
-        return self._shares is not None and self._shares.fetch(parts, self.keys.project.outputs(parts.stage)) is not None
+        outputs = self.keys.project.outputs(parts.stage)
+        return self._shares is not None and self._shares.fetch(parts, outputs, lambda: self._waiting(parts.stage)) is not None
 
     def run(self, parts: KeyParts, reason: Reason, inputs: dict[str, Path], forced: bool = False,
             sources: Iterable[Source] = ()) -> tuple[Outcome, Record]:

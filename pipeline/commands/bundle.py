@@ -17,7 +17,7 @@ from gsac.pipeline.graph import CLIP
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lineage import trace
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.rows import read_rows, result_row
+from gsac.pipeline.rows import read_rows, result_row, stale_reasons
 from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput
 from gsac.stages.counting import counted
@@ -91,14 +91,14 @@ def do_import(arguments: argparse.Namespace) -> ExitCode:
 
 def records_shown(run: RunFolder, store: Store) -> list[Record]:
     """Records of the results that the folder of a run shows. NotUpToDateError where one is stale, or not in the cache any more."""
-    records = []
+    records, stale = [], stale_reasons(run)
     for name, row in read_rows(run).items():
         result = result_row(row)
         if result is None:
             continue
         record = store.lookup(str(result.get("key")))
-        if result.get("stale") or record is None:
-            why = result.get("stale_reason") or "its result is not in the cache any more; run again"
+        if name in stale or record is None:
+            why = stale.get(name) or "its result is not in the cache any more; run again"
             raise NotUpToDateError(f"{run.root}: {name} is not up to date ({why})")
         records.append(record)
     if not records:

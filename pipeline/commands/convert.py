@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import get_args
 
 from gsac.cache.half_made import half_made
-from gsac.pipeline.commands.options import add_force, add_json, require_free
-from gsac.pipeline.commands.render import find_avatar, name_avatar, refuse_footage
+from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
+from gsac.pipeline.commands.render import EXPORT, find_avatar, folder_around, name_avatar, refuse_footage
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.stages.contract import BadInput, did_you_mean
@@ -49,6 +49,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     refuse_footage(out, file)
     require_free(out, arguments.force)
     began = time.monotonic()
+    with progress_reporter(arguments) as reporter:
+        warn_stale(folder_around(file), reporter, EXPORT)
     size = write(file, arguments.format, arguments.pose, out)
     if arguments.json:
         row = {"name": "convert", "status": Outcome.RAN.value, "seconds": time.monotonic() - began, "key": None}

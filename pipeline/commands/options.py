@@ -20,6 +20,7 @@ from gsac.pipeline.plan import StagePlan
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import QUALITIES, STANDARD
 from gsac.pipeline.reporter import PlainReporter, Speaker, open_reporter
+from gsac.pipeline.rows import stale_reasons
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
@@ -77,6 +78,13 @@ def require_free(file: Path, force: bool) -> None:
         raise BadInput(f"{file} is a folder; give the name of a file")
     if os.path.lexists(file) and not force:
         raise BadInput(f"{file} is there already; give another --out, or --force to write over it")
+
+
+def warn_stale(run_folder: RunFolder, say: Speaker, only: str = "") -> None:
+    """Warns of results in the folder, of `only` one stage, that are not up to date: files made of them may not agree."""
+    for name, why in stale_reasons(run_folder).items():
+        if only in ("", name):
+            say.note(f"gsac: warning: {run_folder.root}: {name} is not up to date ({why})")
 
 
 def add_run_folder(command: argparse.ArgumentParser) -> None:

@@ -14,7 +14,7 @@ from urllib.parse import unquote, urlsplit
 
 from gsac.cache.digest import tree_files
 from gsac.cache.half_made import half_made
-from gsac.pipeline.commands.options import add_force, add_json, require_free
+from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import recovery, require_files
 from gsac.pipeline.outcomes import ExitCode
@@ -55,8 +55,10 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if out.suffix.lower() != ".zip" or not out.parent.is_dir():
         raise BadInput(f"--out {out}: expected a file .zip in a folder that exists")
     require_free(out, arguments.force)
-    with RunFolder(folder).hold() if folder.is_dir() else contextlib.nullcontext():
+    run_folder = RunFolder(folder)
+    with progress_reporter(arguments) as reporter, run_folder.hold() if folder.is_dir() else contextlib.nullcontext():
         members = {name: source for name, source in gather(folder).items() if source != out}
+        warn_stale(run_folder, reporter)
         size = write_zip(out, folder.name, members)
     if arguments.json:
         emit({"stages": [], "outputs": {"zip": str(out)}, "metrics": {"files": len(members), "bytes": size}})

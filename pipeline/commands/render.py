@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from gsac.avatar.video import ENCODERS, TRANSPARENT
 from gsac.cache.half_made import half_made
-from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free
+from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
 from gsac.pipeline.journal import Journal
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import require_file
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.avatar.motion.source import Motion
 
-FILE = "avatar.gsac"
+EXPORT, FILE = "export", "avatar.gsac"
 FILMS = tuple(ENCODERS)
 """Suffixes of --out; without one it is a folder of pictures."""
 HEIGHT, WIDTHS = 960, (720, 1280)
@@ -79,6 +79,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--background none: {out.suffix} holds no transparency; expected --out with {' or '.join(TRANSPARENT)}, "
                        "or a folder for PNG pictures")
     with progress_reporter(arguments) as reporter:
+        warn_stale(folder_around(file), reporter, EXPORT)
         frames, (width, height), seconds = film(file, arguments, out, size, background, floor, Journal(reporter.take))
     if arguments.json:
         emit({"stages": [{"name": "render", "status": Outcome.RAN.value, "seconds": seconds, "key": None}],
@@ -165,7 +166,7 @@ def find_avatar(path: Path) -> Path:
     nothing."""
     if path.is_file():
         return path
-    for folder in (path / "export", path):
+    for folder in (path / EXPORT, path):
         if (folder / FILE).is_file():
             return folder / FILE
         require_file(folder / FILE)
@@ -181,12 +182,17 @@ def default_name(file: Path, motion: str | None) -> str:
 def name_avatar(file: Path) -> str:
     """The avatar's name: that of the run's folder, or where its file lies alone the file's own."""
     folder = file.absolute().parent
-    return folder.parent.name if folder.name == "export" else file.stem
+    return folder.parent.name if folder.name == EXPORT else file.stem
+
+
+def folder_around(file: Path) -> RunFolder:
+    """The folder of the run whose stage export wrote the avatar `file`, if it was one."""
+    return RunFolder(file.absolute().parent.parent)
 
 
 def refuse_footage(out: Path, file: Path) -> None:
     """BadInput where the video would take the place of the clip, or of a photo of it, that the avatar was made from."""
-    folder = RunFolder(file.absolute().parent.parent)
+    folder = folder_around(file)
     clip = folder.clip.resolve()
     if out.exists() and clip.exists() and (clip.samefile(out) or clip in out.resolve().parents):
         raise BadInput(f"{out} is the clip that {folder.root} was made from, which is never written over; give another --out")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import shlex
 from pathlib import Path
 
@@ -59,13 +60,14 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         quality, params = own_quality(here, arguments.quality), params or here.params
     configs = resolve_quality(quality, project, params, arguments.set, values_of_person(arguments, project))
     clip = find_clip(arguments.clip)
-    run_folder = RunFolder(arguments.out or (here.root if here is not None else default_out(clip)))
+    run_folder = RunFolder(arguments.out or (here.root if here is not None else default_out(arguments.clip or clip)))
     options = Options(arguments.until, arguments.start, tuple(arguments.force), quality, arguments.anyway)
     with progress_reporter(arguments) as reporter, open_journal(arguments, reporter) as journal:
         store = open_store(journal)
         clip_run = ClipRun(project, configs, store, run_folder, journal)
         clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
+            run_folder.refuse_foreign(clip, project)
             return dry_run(clip_run, clip, options, reporter, arguments.json)
         finished = ClipWork(project, configs, store, options, journal, arguments.replace).do(clip, run_folder)
         for line in closing_lines(run_folder):
@@ -127,5 +129,5 @@ def find_clip(path: Path | None) -> Path:
 
 
 def default_out(clip: Path) -> Path:
-    """`<clip>-avatar` here."""
-    return Path.cwd() / avatar_name(clip)
+    """`<clip>-avatar` here, by the name that the user gave, be it a link's."""
+    return Path.cwd() / avatar_name(Path(os.path.abspath(clip)))

@@ -14,6 +14,7 @@ from gsac.cache.store import Store
 from gsac.pipeline.commands.options import add_json, answer_reporter, find_store, open_store
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.reporter import Speaker
 from gsac.pipeline.rows import read_rows, result_row
 from gsac.pipeline.run_folder import RunFolder
 from gsac.pipeline.sharing import shared_results
@@ -75,7 +76,8 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
     told: dict[str, list[str]] = {"pulled": [], "there": [], "failed": []}
     try:
         for stage, key in chosen(arguments.what, results.keys(), results.bucket.url):
-            word = "there" if store.lookup(key) is not None else "pulled" if pull_one(results, store, stage, key) else "failed"
+            there = store.lookup(key) is not None
+            word = "there" if there else "pulled" if pull_one(results, store, stage, key, reporter) else "failed"
             told[word].append(f"{stage}/{key}")
             reporter.note(f"{stage} {key[:12]}: {word}")
     except RemoteError as error:
@@ -84,11 +86,11 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
     return close(arguments, results, told)
 
 
-def pull_one(results: Results, store: Store, stage: str, key: str) -> Record | None:
+def pull_one(results: Results, store: Store, stage: str, key: str, say: Speaker) -> Record | None:
     """The result, put into the store; None where what is there is not as recorded."""
     from gsac.cache.lease import single_flight
 
-    with single_flight(store, key) as there:
+    with single_flight(store, key, lambda: say.note(f"{stage}: a run here computes it; waiting for it")) as there:
         return there or results.fetch(store, stage, key)
 
 

@@ -8,7 +8,8 @@ import dataclasses
 from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, plan_run
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
-from gsac.pipeline.plan import Reason
+from gsac.pipeline.plan import Reason, StagePlan
+from gsac.pipeline.run import ClipRun
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -21,10 +22,7 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     with answer_reporter(arguments) as reporter:
         clip_run, plans = plan_run(arguments, reporter)
-        plans = [
-            dataclasses.replace(plan, reason=Reason.OUTPUT)
-            if plan.cached is not None and not clip_run.folder.shows(clip_run.store, plan.cached) else plan for plan in plans
-        ]
+        plans = [beside_folder(plan, clip_run) for plan in plans]
         for plan in plans:
             why = "" if plan.up_to_date else plan.sentence
             reporter.note(f"{plan.stage:<10} {plan.reason.value:<18} {why}".rstrip())
@@ -34,3 +32,12 @@ def do(arguments: argparse.Namespace) -> ExitCode:
             {"name": plan.stage, "up_to_date": plan.up_to_date, "reason": plan.reason.value, "why": plan.sentence,
              "key": plan.parts.key if plan.parts else None} for plan in plans]})
     return ExitCode.OK if up_to_date else ExitCode.STALE
+
+
+def beside_folder(plan: StagePlan, clip_run: ClipRun) -> StagePlan:
+    """The plan of a stage, not up to date where the folder shows another result than the cache, or less."""
+    record = plan.cached
+    if record is None or clip_run.folder.shows(clip_run.store, record):
+        return plan
+    there = all(clip_run.folder.path(f"{plan.stage}/{output}").exists() for output in record.outputs)
+    return dataclasses.replace(plan, reason=Reason.OUTPUT if there else Reason.NOT_SHOWN)

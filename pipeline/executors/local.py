@@ -37,8 +37,7 @@ class LocalExecutor:
         self._memory.end()
         self._pool.shutdown(wait=False, cancel_futures=True)
         for process in list(self._running):
-            with contextlib.suppress(ProcessLookupError):
-                process.terminate()  # not SIGINT: a shell makes its background processes ignore it
+            _end(process)
         self._pool.shutdown(wait=True)
 
     def submit(self, job: ClipJob) -> None:
@@ -62,7 +61,14 @@ class LocalExecutor:
     @contextlib.contextmanager
     def _while_running(self, process: subprocess.Popen) -> Iterator[None]:
         self._running.add(process)
+        if self._leaving:  # it began after `__exit__` had looked for it
+            _end(process)
         try:
             yield
         finally:
             self._running.discard(process)
+
+
+def _end(process: subprocess.Popen) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        process.terminate()  # not SIGINT: a shell makes its background processes ignore it

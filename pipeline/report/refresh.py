@@ -40,6 +40,12 @@ class EarlySections:
         return self._drawn
 
 
+def is_outdated(folder: RunFolder) -> bool:
+    """Whether the report was drawn from other results than lie in the folder."""
+    shown = read_origin(folder.root / REPORT)
+    return shown is not None and shown.digest != drawn_from(Results(folder.root))
+
+
 def refresh_report(folder: RunFolder, early: EarlySections | None = None) -> str | None:
     """Draws the report anew if it is due. Returns a warning where that failed or would have cost parts of the page: neither
     fails the run."""

@@ -18,7 +18,7 @@ from gsac.stages.findings import Code, Finding
 from gsac.stages.split import focal
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.crop import plan_crop, principal_point
-from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, PLATE, VIDEO_SUFFIXES, find_plates
+from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, PLATE, find_plates, find_videos
 from gsac.stages.split.people import People, find_extent, find_shown
 from gsac.stages.split.pick import fit_size, pick_evenly, turn_size
 from gsac.stages.split.picture_quality import HEIGHT, judge_pictures, look_at
@@ -47,9 +47,10 @@ def list_photos(folder: Path) -> tuple[list[Path], Path | None]:
     images = [p for p in files if p.suffix.lower() in PHOTO_SUFFIXES]
     photos = [p for p in images if p.stem.lower() != PLATE]
     if not photos:
-        videos = [p.name for p in files if p.suffix.lower() in VIDEO_SUFFIXES]
-        hint = f"or give one of its {len(videos)} videos, such as {folder.name}/{videos[0]}" if videos else "or give a video file"
-        raise BadInput(f"{folder.name}: holds no photos; expected {', '.join(sorted(PHOTO_SUFFIXES))} files of one person, {hint}.")
+        videos = find_videos(folder)
+        one = f"one of its {len(videos)} videos, such as {folder.name}/{videos[0].name}" if videos else "a video file"
+        raise BadInput(f"{folder.name}: holds no photos; expected {', '.join(sorted(PHOTO_SUFFIXES))} files of one person, "
+                       f"or give {one}.")
     return photos, list_plate(folder)
 
 

@@ -8,10 +8,11 @@ from typing import Any
 
 from gsac.avatar.artifacts import Clip, frame_paths
 from gsac.stages.contract import BadInput, Job, StageError
+from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
 from gsac.stages.split.config import NETWORKS
 from gsac.stages.split.crop import describe_crop
-from gsac.stages.split.film import PHOTO_SUFFIXES, find_film
+from gsac.stages.split.film import PHOTO_SUFFIXES, find_film, find_videos
 from gsac.stages.split.masks import list_masks, match_photos
 from gsac.stages.split.people import People
 from gsac.stages.split.photos import list_photos, list_plate, split_photos
@@ -27,6 +28,9 @@ def run(job: Job) -> None:
     plate, source = (None, source) if film is None else (list_plate(source), film)
     if source.is_dir():
         photos, plate = list_photos(source)
+        if videos := find_videos(source):
+            left = f"{source.name}/{videos[0].name}"
+            job.note(f"{counted(len(photos), 'photo')} of the folder taken, {left} not; give {left} itself to take that")
     elif not source.is_file():
         raise BadInput(f"{source}: no such file or folder")
     elif source.stat().st_size == 0:

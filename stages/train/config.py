@@ -182,7 +182,7 @@ class TrainConfig:
         if self.paper_text and self.recipe != "paper":
             raise BadInput("train.paper_text is of recipe paper; set train.recipe to paper, or train.paper_text to false")
         if isinstance(self.gaussians, str) and self.gaussians != AUTO:
-            raise BadInput(f"train.gaussians is {self.gaussians!r}; give a number, or {AUTO}")
+            raise BadInput(f"train.gaussians is {self.gaussians!r}; give a whole number such as 12000, or {AUTO}")
         if self.gaussians != AUTO and self.gaussians < 100:
             raise BadInput(f"train.gaussians is {self.gaussians}; it must be at least 100, or {AUTO}")
         for name, low in (("steps", 1), ("height", 64), ("seed", 0), ("holdout", 0), ("curve", 0), ("pose_rounds", 0),

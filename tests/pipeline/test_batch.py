@@ -1,5 +1,8 @@
 import io
 import signal
+import subprocess
+import threading
+import time
 
 import pytest
 from rich.text import Text
@@ -7,6 +10,8 @@ from rich.text import Text
 from gsac.pipeline.batch import find_clips, make_jobs
 from gsac.pipeline.batch_reporter import open_batch_reporter
 from gsac.pipeline.events import ClipEnded, StageProgress, StageStarted
+from gsac.pipeline.executors.executor import ClipJob, ClipResult, Limits
+from gsac.pipeline.executors.local import LocalExecutor
 from gsac.pipeline.reporter import TerminalReporter
 
 pytestmark = pytest.mark.slow
@@ -69,6 +74,27 @@ def test_ctrl_c_ends_a_batch_and_keeps_what_is_finished(toy, clips):
     assert process.returncode == 130 and "Traceback" not in err
     assert list((toy.cache / "tmp").iterdir()) == []
     assert (toy.root / "avatars" / "one-avatar" / "left" / "out.txt").read_text() == "ALPHA"
+
+
+def test_a_process_that_starts_while_a_batch_is_left_is_ended(monkeypatch, tmp_path):
+    asked = threading.Event()
+
+    def start_late(job, environment, hear, running):
+        asked.set()
+        time.sleep(0.5)
+        with subprocess.Popen(["sleep", "60"]) as process, running(process):
+            return ClipResult(job, process.wait(timeout=30), 0.0)
+
+    monkeypatch.setattr("gsac.pipeline.executors.local.run_process", start_late)
+    with LocalExecutor(Limits(1, 1000.0), lambda *told: None) as executor:
+        executor.submit(ClipJob(tmp_path / "clip.mp4", tmp_path / "out"))
+        asked.wait()
+    assert [result.code for result in executor.collect()] == [-signal.SIGTERM]
+
+
+def test_one_video_in_place_of_a_list_is_sent_to_run(toy):
+    done = toy.gsac("batch", toy.clip)
+    assert done.code == 2 and f"{toy.clip} is one video: `gsac run {toy.clip}` makes its avatar" in " ".join(done.err.split())
 
 
 def test_a_wrong_parameter_is_said_once_before_any_clip_runs(toy, clips):

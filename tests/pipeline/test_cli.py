@@ -80,6 +80,20 @@ def test_a_misspelt_word_is_answered_with_the_nearest_known_one(toy, arguments, 
     assert done.code == ExitCode.USAGE and words in done.err and "Traceback" not in done.err
 
 
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["run", "--qualty", "draft", "clip.mp4"], "unknown option --qualty (did you mean --quality?); `gsac run --help` lists them"),
+    (["run", "clip.mp4", "--hieght=1.7"], "unknown option --hieght (did you mean --height?)"),
+    (["cache", "gc", "--dry-rnu"], "unknown option --dry-rnu (did you mean --dry-run?); `gsac cache gc --help`"),
+    (["--quite", "run"], "unknown option --quite (did you mean --quiet?); `gsac --help`"),
+    (["run", "clip.mp4", "-x"], "unknown option -x; "),
+    (["pack", "one", "two"], "two is one word too many; `gsac pack --help`"),
+])
+def test_a_misspelt_option_is_named_alone_with_the_nearest_one_of_its_command(capsys, arguments, words):
+    assert execute(arguments) == ExitCode.USAGE
+    said = capsys.readouterr().err
+    assert words in said and "usage:" not in said and "draft" not in said
+
+
 def test_a_misspelt_parameter_of_ours_is_answered_with_its_name(capsys):
     assert execute(["run", "nowhere.mp4", "--set", "smplx.heigth_m="]) == ExitCode.USAGE
     assert "unknown parameter smplx.heigth_m (did you mean smplx.height_m?)" in capsys.readouterr().err

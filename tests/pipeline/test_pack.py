@@ -117,6 +117,17 @@ def test_a_zip_that_is_there_stays_unless_it_is_forced(folder, tmp_path, capsys)
     assert json.loads(out.splitlines()[-1])["outputs"] == {"zip": str(tmp_path / "mine.zip")}
 
 
+def test_results_that_are_not_up_to_date_go_along_with_a_warning(folder, capsys):
+    row = {"name": "export", "status": "ran", "stale": True, "stale_reason": "made from an earlier train/avatar.npz; run again"}
+    (folder / "run.json").write_text(json.dumps({"stages": [row]}))
+    warning = "export is not up to date (made from an earlier train/avatar.npz; run again)"
+    picture = ["--out", "one.gif", "--size", "16x16", "--fps", "1"]
+    for command in (["pack", folder], ["convert", folder, "glb"], ["render", folder, *picture]):
+        assert execute([str(word) for word in command]) == 0
+        said = capsys.readouterr()
+        assert warning in " ".join(said.err.split()) and warning not in said.out
+
+
 def test_what_the_user_added_to_export_goes_along_hidden_files_and_the_zip_itself_do_not(folder, capsys):
     (folder / "export" / "note.txt").write_text("mine")
     (folder / "export" / ".thumbs").write_text("hidden")

@@ -1,6 +1,7 @@
 """report.html is drawn anew exactly when what it was drawn from differs, and never loses parts."""
 
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -66,6 +67,17 @@ def test_the_report_says_of_what_the_last_run_left_behind_that_it_is_of_earlier_
     assert "Not of the last run&#39;s inputs: join." in page(toy).read_text()
     assert toy.run("--set", "right.word=last").code == 0
     assert "Not of the last run" not in page(toy).read_text()
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_tells_that_the_report_is_of_an_earlier_one(toy):
+    toy.ran()
+    process = toy.start("run", toy.clip, "--out", toy.out, "--set", "left.word=last", "--set", "right.pause_s=60")
+    toy.wait_for(lambda: toy.runs.count("right") == 2)
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=30)[1]
+    assert process.returncode == 130 and f"report.html is of an earlier run; `gsac report {toy.out}` draws it anew" in said
+    assert toy.gsac("report", toy.out).code == 0 and "Not of the last run&#39;s inputs: join." in page(toy).read_text()
 
 
 def test_a_report_of_an_older_version_is_drawn_anew(toy):

@@ -39,6 +39,28 @@ def test_dry_run_says_what_would_run_and_why_and_runs_nothing(toy):
     assert "left.word changed from 'first' to 'last'" in done.err
 
 
+def test_dry_run_refuses_the_folder_that_a_run_refuses(toy):
+    photos = toy.root / "photos"
+    photos.mkdir()
+    (photos / "1.jpg").write_text("alpha")
+    for words in ([], ["--dry-run"]):
+        done = toy.gsac("run", ".", *words, cwd=photos)
+        assert done.code == 2 and f"{photos}/photos-avatar lies in the folder of the photos" in " ".join(done.err.split())
+
+
+def test_the_folder_of_a_linked_clip_is_named_after_the_link(toy):
+    (toy.root / "ada.mp4").symlink_to(toy.clip)
+    assert toy.gsac("run", "ada.mp4", "--until", "cut").out == f"{toy.root}/ada-avatar\n"
+
+
+def test_the_first_run_of_another_clip_is_one_whatever_the_parameters(toy):
+    toy.ran()
+    other = toy.root / "other.mp4"
+    other.write_text("delta epsilon")
+    plans = toy.gsac("run", other, "--dry-run", "--set", "cut.keep=7", "--json").json["stages"]
+    assert plans[0]["reason"] == "first run"
+
+
 def test_dry_run_writes_no_folder(toy):
     assert toy.run("--dry-run").code == 0
     assert not toy.out.exists()

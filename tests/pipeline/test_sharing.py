@@ -150,6 +150,13 @@ def test_two_machines_at_once_compute_each_stage_once_and_get_the_same(server, m
     assert toys[0].result == toys[1].result and "another machine computes the same result" in "".join(said)
 
 
+def test_a_run_that_waits_for_another_one_here_says_so(server, machine):
+    toy = machine("one")
+    running = [toy.start("run", toy.clip, "--out", toy.root / out, "--set", "cut.pause_s=2", **server.env) for out in "ab"]
+    said = [process.communicate(timeout=60)[1] for process in running]
+    assert "another run computes the same result; waiting for it" in "".join(said) and len(toy.runs) == 4
+
+
 def test_a_stage_that_fails_gives_its_claim_back(server, machine):
     assert machine("one").run("--set", "left.trouble=stage", **server.env).code == 1
     assert server.names("leases") == [] and [name.split("/")[1] for name in server.names("actions")] == ["cut"]

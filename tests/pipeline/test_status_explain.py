@@ -17,13 +17,13 @@ def test_status_is_clean_after_a_run_and_exit_code_3_after_a_change(toy):
     assert [row["reason"] for row in done.json["stages"]] == ["up to date", "up to date", "code changed", "upstream"]
 
 
-def test_status_sees_an_output_that_is_gone_or_altered(toy):
+def test_status_tells_an_output_that_is_gone_from_one_that_was_altered(toy):
     toy.ran()
     (toy.out / "left" / "out.txt").unlink()
     (toy.out / "right" / "out.txt").unlink()
     (toy.out / "right" / "out.txt").write_text("by hand")
     rows = toy.gsac("status", toy.out, "--json").json["stages"]
-    assert [row["reason"] for row in rows] == ["up to date", "output changed", "output changed", "up to date"]
+    assert [row["reason"] for row in rows] == ["up to date", "not in the folder", "output changed", "up to date"]
 
 
 def test_status_takes_a_copy_for_the_real_thing(toy):

@@ -79,9 +79,13 @@ def test_one_video_alone_in_a_folder_is_the_footage_and_of_two_none_is(footage, 
         split(footage, tmp_path / "again")
 
 
-def test_photos_beside_a_video_are_the_footage_plate_or_not(footage):
+def test_photos_beside_a_video_are_the_footage_plate_or_not_and_the_video_is_told(footage, tmp_path):
     assert find_film(footage) == footage / "clip.mkv"
     Image.fromarray(scene()).save(footage / "IMG_1.png")
     assert find_film(footage) is None
+    said, out = [], tmp_path / "out"
+    out.mkdir()
+    run(Job({"clip": footage}, out, SplitConfig(), note=said.append))
+    assert said == ["1 photo of the folder taken, footage/clip.mkv not; give footage/clip.mkv itself to take that"]
     (footage / "masks").mkdir()
     assert find_film(footage) == footage / "clip.mkv"
