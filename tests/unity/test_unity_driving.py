@@ -80,11 +80,22 @@ def test_another_person_takes_the_place_of_one_and_the_users_things_stay(play, f
     assert lines[4] == "other joints: alive True person person old head False new True moved False"
 
 
-def test_a_broken_file_is_read_once_and_said_once(play, files, tmp_path):
-    (tmp_path / "cut.gsac").write_bytes((files / "figure.gsac").read_bytes()[:1000])
-    first, calls = play("broken", tmp_path / "cut.gsac").splitlines()
+@pytest.fixture(scope="module")
+def broken(play, files, tmp_path_factory):
+    """Lines: of a file cut short, and of a whole one in its place."""
+    cut = tmp_path_factory.mktemp("broken") / "cut.gsac"
+    cut.write_bytes((files / "figure.gsac").read_bytes()[:1000])
+    return play("broken", cut, files / "figure.gsac").splitlines()
+
+
+def test_a_broken_file_is_read_once_and_said_once(broken):
+    first, calls = broken[:2]
     assert first.startswith("read 1 said 1: person: the avatar cannot be drawn: ") and "truncated" in first
     assert calls.startswith("calls say ") and "truncated" in calls
+
+
+def test_a_good_file_in_a_broken_ones_place_is_drawn(broken):
+    assert broken[2] == "said 1 draws 1"
 
 
 @pytest.fixture(scope="module")

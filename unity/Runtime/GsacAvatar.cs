@@ -241,6 +241,8 @@ namespace Gsac
             if (model != null) model.Release();
             model = null;
             fault = null;
+            var drawn = GetComponent<GsacRenderer>();
+            if (drawn != null) drawn.Retry(); // null where the person is being destroyed
         }
 
         void FreeBuilt()

@@ -156,7 +156,7 @@ namespace Gsac
 
         void OnEnable()
         {
-            trouble = null;
+            Retry();
             GsacCameras.Add(this);
         }
 
@@ -200,6 +200,12 @@ namespace Gsac
         public void Refresh()
         {
             gathered = false;
+        }
+
+        /// <summary>Has the next camera try again what could not be drawn; called where the avatar's file may be another.</summary>
+        internal void Retry()
+        {
+            trouble = null;
         }
 
         /// <summary>What this camera sees of the avatar, null where that is nothing; called just before the camera culls.</summary>

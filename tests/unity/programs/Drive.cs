@@ -19,7 +19,7 @@ public static class Drive
             case "parts": Parts(args[1], int.Parse(args[2])); break;
             case "props": Props(args[1]); break;
             case "swap": Swap(args[1], args[2], args[3]); break;
-            case "broken": Broken(args[1]); break;
+            case "broken": Broken(args[1], args[2]); break;
             case "nudge": Nudge(args[1]); break;
             case "several": Several(args[1]); break;
             case "clip": Clip(args[1]); break;
@@ -178,11 +178,14 @@ public static class Drive
                           + " moved " + (Vector3.Distance(p, q) > 1e-5f));
     }
 
-    static void Broken(string file)
+    /// <summary>A broken file, shown and asked; then one that can be read in its place.</summary>
+    static void Broken(string file, string sound)
     {
         var avatar = new GameObject("person").AddComponent<GsacAvatar>();
         Player.SetField(avatar, "bytes", Player.Text(File.ReadAllBytes(file)));
-        Player.AddCamera("eye");
+        Player.AddCamera("eye").transform.SetPositionAndRotation(new Vector3(0, 1, 4), Quaternion.Euler(0, 180, 0));
+        int draws = 0;
+        Player.OnDraw = (asked, indices, count) => draws++;
         var stream = avatar.gameObject.AddComponent<GsacPoseStream>();
         Action frame = Player.Frame(new[] { avatar.gameObject });
         for (int i = 0; i < 5; i++) frame();
@@ -196,6 +199,9 @@ public static class Drive
         {
             Console.WriteLine("calls say " + e.Message);
         }
+        avatar.Use(File.ReadAllBytes(sound));
+        frame();
+        Console.WriteLine("said " + Player.Errors.Count + " draws " + draws);
     }
 
     /// <summary>The inspector's sliders where the joint stands elsewhere than they were left.</summary>
