@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.srgb import to_linear
+
 PIXELS_PER_DEGREE = 67.0
 """A 0.7 m wide 3840 px monitor from 0.7 m."""
 QC, PC, PT, QF = 0.7, 0.4, 0.95, 0.5
@@ -22,7 +24,7 @@ WHITE_POINT = TO_XYZ.sum(1)
 
 def flip(reference: np.ndarray, test: np.ndarray, pixels_per_degree: float = PIXELS_PER_DEGREE) -> np.ndarray:
     """Difference (H, W) in 0..1, 0 where equal. reference, test: (H, W, 3) sRGB in 0..1."""
-    opponents = [_to_opponent(_to_linear(np.asarray(image, np.float32))) for image in (reference, test)]
+    opponents = [_to_opponent(to_linear(np.asarray(image, np.float32))) for image in (reference, test)]
     filtered = [_adjust_hunt(_to_lab(_filter_contrast(o, pixels_per_degree))) for o in opponents]
     corners = _adjust_hunt(_to_lab(np.array([[[0.0, 1, 0], [0, 0, 1]]])))
     largest = float(_hyab(corners[:, :1], corners[:, 1:])[0, 0]) ** QC
@@ -32,10 +34,6 @@ def flip(reference: np.ndarray, test: np.ndarray, pixels_per_degree: float = PIX
     features = [_features((o[..., 0] + 16) / 116, pixels_per_degree) for o in opponents]
     strongest = np.max([np.abs(a - b) for a, b in zip(*features, strict=True)], axis=0)
     return np.clip(colour, 0, 1) ** (1 - np.clip(strongest / np.sqrt(2), 0, 1) ** QF)
-
-
-def _to_linear(srgb: np.ndarray) -> np.ndarray:
-    return np.where(srgb > 0.04045, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4, srgb / 12.92)
 
 
 def _to_opponent(linear: np.ndarray) -> np.ndarray:

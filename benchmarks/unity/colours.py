@@ -26,6 +26,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.raster import render, render_bound, render_bound_backward
 from gsac.avatar.rotation import exp
+from gsac.avatar.srgb import to_display, to_linear
 from gsac.benchmarks.unity.frame import draw_rule, index_bits
 from gsac.benchmarks.unity.gpu import Gpu, Painting, projection
 from gsac.benchmarks.unity.shaders import CORE, STEREO, compile_pass, shader_passes
@@ -42,16 +43,6 @@ EDGE = 0.02
 """Least alpha of a pixel of the person."""
 BEHIND = {"": "GsacBehind", "UniversalPipeline": "_CameraOpaqueTexture", "HDRenderPipeline": "_ColorPyramidTexture"}
 """Render pipeline -> the shader's name of the copy of what lies behind."""
-
-
-def to_linear(display: np.ndarray) -> np.ndarray:
-    """Linear light (...) of display values (...)."""
-    return np.where(display > .04045, ((np.maximum(display, 0) + .055) / 1.055) ** 2.4, display / 12.92)
-
-
-def to_display(linear: np.ndarray) -> np.ndarray:
-    """Display values (...) of linear light (...)."""
-    return np.where(linear > .0031308, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - .055, linear * 12.92)
 
 
 class Shot(NamedTuple):

@@ -14,6 +14,7 @@ import numpy as np
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.rotation import to_xyzw
+from gsac.avatar.srgb import to_linear
 from gsac.stages.export.gltf_body import body_document, head_of
 from gsac.stages.export.gltf_file import ARRAY_BUFFER, GltfFile
 from gsac.stages.export.ply import SH0
@@ -41,11 +42,11 @@ def splats_glb_bytes(avatar: RiggedAvatar, means: np.ndarray, quats: np.ndarray,
 
 def _points(file: GltfFile, g: Gaussians, means: np.ndarray, quats: np.ndarray, scales: np.ndarray) -> dict:
     """The mesh of the gaussians, whose arrays go into the file."""
-    rgb = np.clip(g.rgb, 0, 1)
+    rgb = to_linear(np.clip(g.rgb, 0, 1))  # glTF's COLOR_0 holds linear light
     return {"primitives": [{
         "mode": POINTS, "attributes": {
             "POSITION": file.add(means.astype("<f4"), ARRAY_BUFFER, bounds=True),
-            "COLOR_0": file.add(np.column_stack([_linear(rgb), g.opacity]).astype("<f4"), ARRAY_BUFFER),
+            "COLOR_0": file.add(np.column_stack([rgb, g.opacity]).astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:ROTATION": file.add(to_xyzw(quats).astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:SCALE": file.add(scales.astype("<f4"), ARRAY_BUFFER),
             f"{SPLATS}:OPACITY": file.add(g.opacity.astype("<f4"), ARRAY_BUFFER),
@@ -54,8 +55,3 @@ def _points(file: GltfFile, g: Gaussians, means: np.ndarray, quats: np.ndarray, 
         }, "extensions": {SPLATS: {"kernel": "ellipse", "colorSpace": "srgb_rec709_display",
                                    "projection": "perspective", "sortingMethod": "cameraDistance"}}}],
         "name": "gaussians"}
-
-
-def _linear(srgb: np.ndarray) -> np.ndarray:
-    """sRGB to linear light, which glTF's COLOR_0 holds."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
+from gsac.avatar.srgb import to_display
 from gsac.benchmarks.unity import colours
 from gsac.benchmarks.unity.shaders import STEREO
 
@@ -52,7 +53,7 @@ def test_a_linear_project_shows_the_trained_picture_at_40_db_whatever_lies_behin
 def test_before_a_bright_sky_the_copy_behind_gives_the_trained_edges_at_any_exposure(stage, shot, avatar, exposure):
     """What is drawn and what is copied are in the frame's exposure already: nothing is undone."""
     rgb, alpha = colours.trained_picture(shot, avatar.faces, avatar.gaussians)
-    sky = float(colours.to_display(np.asarray(colours.SKY * exposure)))
+    sky = float(to_display(np.asarray(colours.SKY * exposure)))
     want = rgb + (1 - alpha[..., None]) * sky
     known, unknown = (colours.decibels(stage.lay(shot, sky, known), want, alpha > colours.EDGE) for known in (True, False))
     print(f"sky of display value {sky:.2f}: {known:.1f} dB, without the copy {unknown:.1f}")
