@@ -8,7 +8,6 @@ from pathlib import Path
 READ_ONLY = "runs may go on without keeping their results, or set GSAC_CACHE to a folder that you may write"
 FULL = "nothing that was kept before is lost; free space, run `gsac cache gc`, or set GSAC_CACHE to a larger disk"
 LARGEST = "nothing that was kept before is lost; raise `ulimit -f`, or set GSAC_CACHE to a disk that takes larger files"
-INTEGRITY = "run `gsac cache verify`; what it finds damaged is moved to quarantine/ and computed again"
 
 
 class CacheError(Exception):
@@ -16,7 +15,6 @@ class CacheError(Exception):
 
     def __init__(self, message: str, hint: str = "") -> None:
         super().__init__(f"{message}; {hint}" if hint else message)
-        self.hint = hint
 
 
 class CacheFolderError(CacheError):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator
-from pathlib import Path
 
 from gsac.cache.errors import CacheReadOnlyError, from_os_error
 from gsac.cache.lock import exclusive, if_free, shared, without_locks
@@ -35,8 +34,8 @@ def single_flight(
 class Lease:
     """What a run in progress uses, by key or by object; `add` it before looking it up."""
 
-    def __init__(self, store: Store, file: Path | None, descriptor: int | None) -> None:
-        self._store, self._file, self._descriptor = store, file, descriptor
+    def __init__(self, store: Store, descriptor: int | None) -> None:
+        self._store, self._descriptor = store, descriptor
 
     def add(self, *names: str) -> None:
         """Keeps gc from removing the results of these keys and the objects of these names."""
@@ -51,12 +50,12 @@ def in_use(store: Store, names: Iterable[str] = ()) -> Iterator[Lease]:
     file = store.root / "leases" / f"{os.getpid()}-{os.urandom(6).hex()}.run"
     with contextlib.ExitStack() as held:
         try:
-            lease = Lease(store, file, held.enter_context(exclusive(file)))
+            lease = Lease(store, held.enter_context(exclusive(file)))
             if file.parent in without_locks:
                 store.say(f"gsac: warning: the file system of the cache {store.root} has no locks: processes of this machine keep "
                           "clear of each other, but `gsac cache gc` does not see runs on other machines")
         except OSError:
-            lease = Lease(store, None, None)  # read-only: gc cannot run on it either
+            lease = Lease(store, None)  # read-only: gc cannot run on it either
         lease.add(*names)
         yield lease
 
