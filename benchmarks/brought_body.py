@@ -41,7 +41,7 @@ def main() -> None:
         return
     describe_weights(body, np.asarray(read_npz(file, {"weights"})["weights"], np.float64), "weights")
     if body.posedirs is not None:
-        describe_correctives(body, body.posedirs)
+        describe_correctives(body.posedirs)
 
 
 def describe_weights(body: Body, weights: np.ndarray, name: str) -> None:
@@ -53,7 +53,7 @@ def describe_weights(body: Body, weights: np.ndarray, name: str) -> None:
                                                for pose, at in zip(strong_poses(), whole, strict=True)])
 
 
-def describe_correctives(body: Body, posedirs: np.ndarray) -> None:
+def describe_correctives(posedirs: np.ndarray) -> None:
     """Prints what the sparse correctives of an avatar's file lose, and what none do. posedirs: (V, 3, 486) m."""
     thin = thin_out(posedirs)
     moves = [move_rest(posedirs, pose) for pose in strong_poses()]

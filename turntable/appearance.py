@@ -86,7 +86,7 @@ class Appearance:
             lash = np.clip((EYE_RADIUS * 1.13 - d) / 0.0015, 0, 1) * (z > centre[2])
             colour = _mix(colour, self.hair * 0.35, (0.85 - 0.35 * (y < centre[1] - 0.004)) * lash)
         colour = _mix(colour, self.hair * 0.8, self._brow(p))
-        scalp = np.clip(hair_field(p, region, self.person.outfit) / 0.012 + 0.6, 0, 0.85) * (z < 0.14)
+        scalp = np.clip(hair_field(p, region) / 0.012 + 0.6, 0, 0.85) * (z < 0.14)
         return _mix(colour, self.hair, scalp), 0.28 + 0.25 * lips + 0.2 * nails
 
     def _brow(self, p):

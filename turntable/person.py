@@ -179,7 +179,7 @@ def dress(body: Body, rest: np.ndarray, region: np.ndarray, outfit: Outfit, thic
         "shirt": np.minimum.reduce([y - outfit.hem, (outfit.sleeve - arm) * 1.0, np.where(near_neck > 0, neck - y, 0.2)]),
         "trousers": np.minimum.reduce([outfit.hem + 0.07 - y, y - outfit.cuff, 0.4 - arm]),
         "shoes": np.minimum(-0.715 - y, 0.6 - arm),
-        "hair": hair_field(template, region, outfit),
+        "hair": hair_field(template, region),
     }
     waist = np.clip((0.36 - y) / 0.25, 0, 1) * (arm < 0.3)
     sleeve = np.clip((arm - 0.25) / (outfit.sleeve - 0.2), 0, 1.2) * (y > 0.45)
@@ -221,7 +221,7 @@ def dress(body: Body, rest: np.ndarray, region: np.ndarray, outfit: Outfit, thic
     return shells, hidden
 
 
-def hair_field(template: np.ndarray, region: np.ndarray, outfit: Outfit) -> np.ndarray:
+def hair_field(template: np.ndarray, region: np.ndarray) -> np.ndarray:
     """(N,) m, positive on the scalp; the hairline runs from the forehead over the ears to the nape.
 
     template: (N, 3) m, place on the template body; region: (N, 6).

@@ -30,7 +30,7 @@ def begin(body: Body, sightings: Sightings, focal: float, center: np.ndarray) ->
     ours = estimate_start(body, sightings, focal, center)
     if sightings.start is None:
         return ours, ()
-    brought = lay_out(body, sightings.start, ours)
+    brought = lay_out(sightings.start, ours)
     placed = place(body, sightings, brought, focal, center)
     off, usual = (measure_trunk(body, sightings, state, focal, center) for state in (placed, ours))
     doubted = ~np.isfinite(placed.transl).all(1) | (off > usual + WORSE * sightings.person_height)
@@ -38,7 +38,7 @@ def begin(body: Body, sightings: Sightings, focal: float, center: np.ndarray) ->
     return placed, describe(~sightings.start.given, doubted)
 
 
-def lay_out(body: Body, start: Start, ours: State) -> State:
+def lay_out(start: Start, ours: State) -> State:
     """The brought rotations and betas, interpolated over frames that lack them; of joints that no frame has, and where there are
     no betas, ours."""
     local = ours.local.copy()

@@ -24,7 +24,7 @@ def take_as_fit(body: Body, sightings: Sightings, outlines: list[Outline], confi
     start, center, focal = sightings.start, sightings.center, focal_prior(sightings, config)[0]
     assert start is not None, "SmplxConfig.check asks for it"
     ours = estimate_start(body, sightings, focal, center)
-    state = lay_out(body, start, ours)
+    state = lay_out(start, ours)
     solved = place(body, sightings, state, focal, center).transl
     transl = np.where(np.isfinite(solved), solved, ours.transl)
     if start.betas is not None:
