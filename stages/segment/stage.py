@@ -224,16 +224,6 @@ def describe_nobody(paths: list[Path], unfound: np.ndarray) -> str:
             "segment.method=selfie")
 
 
-def segment_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,
-                  plate: Plate | None, iterations: int) -> tuple[np.ndarray, bool]:
-    """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).
-
-    Returns alpha (H, W) float32 of a frame by itself, and whether the plate, if any, fits it.
-    """
-    cutout, fits = cut_frame(image, probability, xy, score, plate, iterations)
-    return finish(cutout, image.shape[:2], plate), fits
-
-
 def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score: np.ndarray,
               plate: Plate | None, iterations: int) -> tuple[Cutout, bool]:
     """image: (H, W, 3) uint8; probability: (H, W); xy: (133, 2) px; score: (133,).

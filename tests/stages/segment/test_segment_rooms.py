@@ -17,7 +17,7 @@ from gsac.stages.segment.matting import soften
 from gsac.stages.segment.network import onto_frame, person_region
 from gsac.stages.segment.plate import Plate, compare
 from gsac.stages.segment.plate_from_video import masked_median
-from gsac.stages.segment.stage import METHODS, around, segment_frame
+from gsac.stages.segment.stage import METHODS, around, cut_frame, finish
 
 HEIGHT, WIDTH = 480, 320
 NO_POINTS = np.zeros((133, 2)), np.zeros(133)
@@ -53,6 +53,12 @@ def painted(alpha, background, person=(40, 60, 130), noise=2.0, seed=1):
 def empty_scene(background, seed=5):
     """The plate of a background, with its own noise."""
     return Plate(painted(np.zeros((HEIGHT, WIDTH)), background, seed=seed), np.ones((HEIGHT, WIDTH), bool))
+
+
+def mask_frame(image, probability, points, plate):
+    """Alpha (H, W) of a frame by itself, and whether the plate, if any, fits it. points: xy (133, 2) px, score (133,)."""
+    cutout, fits = cut_frame(image, probability, *points, plate, 1)
+    return finish(cutout, image.shape[:2], plate), fits
 
 
 def rough(alpha, sigma=8.0):
@@ -144,8 +150,8 @@ def test_a_plate_brings_back_what_the_network_missed_and_clears_what_it_filled(p
     image, plate = painted(truth, background), empty_scene(background)
     said = rough(figure())
     said[:, 230:] *= 0.4  # half of the arm is doubted
-    with_plate, fits = segment_frame(image, said, *points, plate, 1)
-    without, _ = segment_frame(image, said, *points, None, 1)
+    with_plate, fits = mask_frame(image, said, points, plate)
+    without, _ = mask_frame(image, said, points, None)
     assert fits and iou(with_plate > 0.5, truth > 0.5) > 0.97 > iou(without > 0.5, truth > 0.5)
 
 
@@ -156,7 +162,7 @@ def test_a_soft_shadow_on_the_scene_is_not_person(points):
     cv2.ellipse(shadow, (160, 424), (120, 28), 0, 0, 360, 0.3, -1)
     shaded = background * (1 - cv2.GaussianBlur(shadow, (0, 0), 10))[..., None]
     image, plate = painted(truth, shaded), empty_scene(background)
-    alpha, fits = segment_frame(image, rough(truth), *points, plate, 1)
+    alpha, fits = mask_frame(image, rough(truth), points, plate)
     assert fits and (alpha > 0.5)[(truth == 0)].mean() < 0.004
     assert iou(alpha > 0.5, truth > 0.5) > 0.97
 
@@ -176,7 +182,7 @@ def test_clothes_that_look_like_the_scene_are_not_cut_open(points):
     patch = np.zeros((HEIGHT, WIDTH), bool)
     patch[200:360, 124:196] = True
     image[patch] = plate.image[patch]
-    alpha, _ = segment_frame(image, rough(truth), *points, plate, 1)
+    alpha, _ = mask_frame(image, rough(truth), points, plate)
     assert (alpha > 0.5)[patch].mean() > 0.95
 
 
@@ -184,8 +190,8 @@ def test_a_plate_of_another_place_is_not_used(points):
     truth = figure()
     plate = empty_scene(scene(seed=9, base=(60, 160, 60), spread=40))
     image = painted(truth, scene())
-    alpha, fits = segment_frame(image, rough(truth), *points, plate, 1)
-    assert not fits and np.array_equal(alpha, segment_frame(image, rough(truth), *points, None, 1)[0])
+    alpha, fits = mask_frame(image, rough(truth), points, plate)
+    assert not fits and np.array_equal(alpha, mask_frame(image, rough(truth), points, None)[0])
 
 
 def test_where_the_plate_was_never_seen_it_says_nothing(points):
@@ -195,7 +201,7 @@ def test_where_the_plate_was_never_seen_it_says_nothing(points):
     plate.image[:, 100:260] = 0
     difference = compare(painted(truth, background), plate.half, rough(truth))
     assert not difference.empty[:, 50:130].any() and not difference.changed[:, 50:130].any()
-    alpha, fits = segment_frame(painted(truth, background), rough(truth), *points, plate, 1)
+    alpha, fits = mask_frame(painted(truth, background), rough(truth), points, plate)
     assert fits and iou(alpha > 0.5, truth > 0.5) > 0.97
 
 
@@ -216,7 +222,7 @@ def test_a_moving_camera_teaches_no_plate_that_is_used(points):
     images = np.stack([painted(figure(), wide[:, s: s + WIDTH], seed=s) for s in range(0, 80, 10)])
     plate = masked_median(images, np.repeat(figure()[None] == 0, 8, axis=0))
     for image in images[::3]:
-        assert not segment_frame(image, rough(figure()), *points, plate, 1)[1]
+        assert not mask_frame(image, rough(figure()), points, plate)[1]
 
 
 @pytest.mark.parametrize("size", [(HEIGHT, WIDTH), (HEIGHT - 1, WIDTH - 1)])
@@ -224,12 +230,12 @@ def test_odd_sizes_pass(points, size):
     truth = figure()
     cut = np.s_[: size[0], : size[1]]
     image, plate = painted(truth, scene())[cut], empty_scene(scene()).part((0, 0, size[1], size[0]))
-    alpha, _ = segment_frame(image, rough(truth)[cut], *points, plate, 1)
+    alpha, _ = mask_frame(image, rough(truth)[cut], points, plate)
     assert alpha.shape == size and iou(alpha > 0.5, truth[cut] > 0.5) > 0.97
 
 
 def test_no_probability_anywhere_gives_an_empty_mask(points):
-    alpha, _ = segment_frame(painted(figure(), scene()), np.zeros((HEIGHT, WIDTH), np.float32), *points, None, 1)
+    alpha, _ = mask_frame(painted(figure(), scene()), np.zeros((HEIGHT, WIDTH), np.float32), points, None)
     assert alpha.shape == (HEIGHT, WIDTH) and not alpha.any()
 
 
