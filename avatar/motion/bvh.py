@@ -29,11 +29,6 @@ def read_bvh(path: Path) -> Source:
         return _Reader(file, str(path)).source()
 
 
-def parse_bvh(text: str, where: str = "motion.bvh") -> Source:
-    """As `read_bvh`, from the text of a file; where: its name in messages."""
-    return _Reader(io.StringIO(text, newline=None), where).source()
-
-
 class _Reader:
     """Joints in the order of the file, then the table of numbers; one line of it is in memory at a time."""
 

@@ -1,10 +1,14 @@
 """A person's skeleton with a made-up dance, and the same dance written as other tools write it."""
 
+import tempfile
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.body import Body
+from gsac.avatar.motion.bvh import read_bvh
 from gsac.avatar.motion.source import Motion
 from gsac.avatar.skinning import joint_transforms
 
@@ -74,6 +78,14 @@ def bvh_text(skeleton, motion, names=None, unit=1.0, order="ZXY", world=None):
     table = np.concatenate(columns, axis=1)
     lines += ["MOTION", f"Frames: {len(table)}", f"Frame Time: {1 / motion.fps:.9f}", *map(numbers, table)]
     return "\n".join(lines) + "\n"
+
+
+def read_text(text, name="motion.bvh"):
+    """The Source that a BVH of this text and name holds."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        path.write_text(text, encoding="utf-8", newline="")
+        return read_bvh(path)
 
 
 def mixamo(name):

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.write import avatar_bytes
-from gsac.avatar.motion.bvh import parse_bvh, read_bvh
+from gsac.avatar.motion.bvh import read_bvh
 from gsac.avatar.motion.files import read_motion
 from gsac.avatar.motion.names import match
 from gsac.avatar.motion.retarget import retarget
@@ -95,7 +95,7 @@ def test_a_dropped_bvh_plays_as_python_retargets_it(page, figure, skeleton, tmp_
     path.write_text(text)
     assert drop(page, path) == f"dance {unit}: put on this avatar"
     assert page.run("gsac.playing.clip") == f"dance {unit}"
-    assert_same(clip_of(page, f"dance {unit}"), onto(figure, parse_bvh(text)))
+    assert_same(clip_of(page, f"dance {unit}"), onto(figure, read_bvh(path)))
     page.until("gsac.clock > 0.1")
     assert page.run("document.querySelector('#poses button[aria-pressed=true]').textContent") == f"dance {unit}"
 
@@ -197,14 +197,14 @@ def gltf_of(source, step="LINEAR"):
 def test_a_gltf_is_the_same_motion_as_the_bvh(page, figure, skeleton, tmp_path):
     moved = dance(figure, 25)
     moved.fps = 30.0
-    source = parse_bvh(dances.bvh_text(skeleton, moved, [dances.mixamo(n) for n in figure.joint_names]))
+    source = dances.read_text(dances.bvh_text(skeleton, moved, [dances.mixamo(n) for n in figure.joint_names]))
     (tmp_path / "it.gltf").write_text(json.dumps(gltf_of(source)))
     assert drop(page, tmp_path / "it.gltf") == "dance: put on this avatar"
     assert_same(clip_of(page, "dance"), onto(figure, source), degrees=0.1)
 
 
 def test_a_gltf_whose_buffer_lies_beside_it_needs_both_files_dropped_together(page, figure, skeleton, tmp_path):
-    document = gltf_of(parse_bvh(dances.bvh_text(skeleton, dance(figure))))
+    document = gltf_of(dances.read_text(dances.bvh_text(skeleton, dance(figure))))
     (tmp_path / "it.bin").write_bytes(base64.b64decode(document["buffers"][0]["uri"].split(",")[1]))
     document["buffers"][0]["uri"] = "it.bin"
     (tmp_path / "it.gltf").write_text(json.dumps(document))
@@ -215,7 +215,7 @@ def test_a_gltf_whose_buffer_lies_beside_it_needs_both_files_dropped_together(pa
 def test_what_is_wrong_with_a_file_is_said_on_the_page_and_what_plays_goes_on(page, figure, skeleton, tmp_path):
     playing, text = page.run("gsac.playing"), dances.bvh_text(skeleton, dance(figure))
     lines = text.splitlines()
-    document = gltf_of(parse_bvh(text))
+    document = gltf_of(dances.read_text(text))
     bad = {
         "odd.bvh": ("\n".join([*lines[:-2], "1 2 x"]), f"odd.bvh, line {len(lines) - 1}: 3 numbers; the skeleton has 168 channels"),
         "cut.bvh": (text[:len(text) // 2], "cut.bvh, line "),
@@ -237,7 +237,7 @@ def test_what_is_wrong_with_a_file_is_said_on_the_page_and_what_plays_goes_on(pa
 
 def test_fuzz_any_damage_to_a_motion_is_a_motion_error_or_a_motion(page, figure, skeleton):
     text = dances.bvh_text(skeleton, dance(figure, 2))
-    document = gltf_of(parse_bvh(text))
+    document = gltf_of(dances.read_text(text))
     expose(page, "MotionError", "readBvh", "readGltf", "retarget")
     kinds = page.run(f"const bvhWhole = {json.dumps(text)}, gltfWhole = {json.dumps(json.dumps(document))};" + """(() => {
       let seed = 7;

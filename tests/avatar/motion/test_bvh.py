@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.motion import source as motion_source
-from gsac.avatar.motion.bvh import MAX_BYTES, parse_bvh, read_bvh
+from gsac.avatar.motion.bvh import MAX_BYTES, read_bvh
 from gsac.avatar.motion.source import MotionError
 from support import dances
 
@@ -35,7 +35,7 @@ Frame Time: 0.05
 
 
 def test_positions_take_the_offsets_place_and_angles_turn_in_the_order_of_the_channels():
-    source = parse_bvh(SMALL)
+    source = dances.read_text(SMALL)
     assert (source.names, source.parents.tolist(), source.fps) == (["Hips", "Chest"], [-1, 0], 20)
     np.testing.assert_allclose(source.places[0], [[1, 2, 3], [-49, 2, 3]], atol=1e-9)
     np.testing.assert_allclose(source.rest_places, [[0, 90, 0], [0, 140, 0]])
@@ -44,7 +44,7 @@ def test_positions_take_the_offsets_place_and_angles_turn_in_the_order_of_the_ch
 
 
 def test_windows_line_ends_tabs_and_names_with_spaces_are_read():
-    source = parse_bvh(SMALL.replace("\n", "\r\n").replace("  ", "\t").replace("ROOT Hips", "ROOT Bip01 Pelvis"))
+    source = dances.read_text(SMALL.replace("\n", "\r\n").replace("  ", "\t").replace("ROOT Hips", "ROOT Bip01 Pelvis"))
     assert source.names[0] == "Bip01 Pelvis" and len(source.places) == 2
 
 
@@ -69,7 +69,7 @@ def test_a_file_cut_anywhere_is_a_named_error():
     for cut in range(len(SMALL) - 2):
         if SMALL[:cut].split() != SMALL.split():
             try:
-                parse_bvh(SMALL[:cut], "cut.bvh")
+                dances.read_text(SMALL[:cut], "cut.bvh")
             except MotionError as e:
                 assert "cut.bvh, line " in str(e)
             else:
@@ -81,7 +81,7 @@ def test_a_file_cut_anywhere_is_a_named_error():
 def test_fuzz_any_damage_gives_a_named_error_or_a_motion(noise, at, removed):
     text = SMALL[:at] + noise.decode("latin-1") + SMALL[at + removed:]
     try:
-        source = parse_bvh(text)
+        source = dances.read_text(text)
     except MotionError:
         return
     assert np.isfinite(source.places).all() and np.isfinite(source.turns).all()
@@ -91,7 +91,7 @@ def test_a_skeleton_without_end_and_a_huge_file_are_refused_at_once(tmp_path):
     deep = "HIERARCHY\nROOT a\n{\n" + "JOINT b\n{\n" * 100_000
     began = time.process_time()
     with pytest.raises(MotionError, match="generations"):
-        parse_bvh(deep)
+        dances.read_text(deep)
     with open(tmp_path / "huge.bvh", "wb") as f:
         f.truncate(MAX_BYTES + 1)
     with pytest.raises(MotionError, match="huge.bvh"):
@@ -103,12 +103,12 @@ def test_frames_times_joints_and_lines_have_a_bound_that_the_error_names(monkeyp
     many = SMALL.replace("Frames: 2", "Frames: 100000") + "1 2 3 0 0 0 0 0 0\n" * 99_998
     monkeypatch.setattr(motion_source, "MOST", 55 * 100)
     with pytest.raises(MotionError, match=r"line 119: 100000 frames of 2 joints; at most 100 are read: cut it"):
-        parse_bvh(many)
+        dances.read_text(many)
     with pytest.raises(MotionError, match=r"line 19: a line of more than 1048576 characters"):
-        parse_bvh(SMALL.replace("1 2 3", "1 " * 600_000, 1))
+        dances.read_text(SMALL.replace("1 2 3", "1 " * 600_000, 1))
 
 
 def test_what_another_tool_writes_is_the_motion_again(skeleton, dance):
-    source = parse_bvh(dances.bvh_text(skeleton, dance, unit=100, order="YXZ"))
+    source = dances.read_text(dances.bvh_text(skeleton, dance, unit=100, order="YXZ"))
     order = [source.names.index(name) for name in skeleton.names]
     np.testing.assert_allclose(source.places[:, order] / 100, skeleton.posed(dance.rotation, dance.transl), atol=1e-6)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.motion import quat
-from gsac.avatar.motion.bvh import parse_bvh, read_bvh
+from gsac.avatar.motion.bvh import read_bvh
 from gsac.avatar.motion.names import match, split_side
 from gsac.avatar.motion.retarget import retarget
 from gsac.avatar.motion.source import Motion, MotionError, Source
@@ -25,7 +25,7 @@ def onto(skeleton, source):
     (1, Rotation.from_rotvec([np.pi, 0, 0]), dances.mixamo)])
 def test_a_motion_comes_back_from_any_unit_world_and_naming(skeleton, dance, unit, world, name):
     names = [name(n) for n in skeleton.names]
-    dances.assert_same(onto(skeleton, parse_bvh(dances.bvh_text(skeleton, dance, names, unit, world=world))), dance)
+    dances.assert_same(onto(skeleton, dances.read_text(dances.bvh_text(skeleton, dance, names, unit, world=world))), dance)
 
 
 def strange(source, seed=5):
@@ -36,13 +36,13 @@ def strange(source, seed=5):
 
 
 def test_axes_of_the_bones_do_not_matter(skeleton, dance):
-    source = strange(parse_bvh(dances.bvh_text(skeleton, dance, [dances.mixamo(n) for n in skeleton.names])))
+    source = strange(dances.read_text(dances.bvh_text(skeleton, dance, [dances.mixamo(n) for n in skeleton.names])))
     dances.assert_same(onto(skeleton, source), dance)
 
 
 def test_a_rest_pose_that_is_no_person_is_replaced_by_a_frame(skeleton, dance):
     """All bones of the rest pose along x, as motion capture software writes them; frame 0 is a T-pose."""
-    source = strange(parse_bvh(dances.bvh_text(skeleton, dance)))
+    source = strange(dances.read_text(dances.bvh_text(skeleton, dance)))
     folded = Source(source.fps, source.names, source.parents, Rotation.random(55, random_state=1).as_quat(),
                     np.arange(55)[:, None] * np.array([.1, 0, 0]), source.turns, source.places)
     got = onto(skeleton, folded)
@@ -52,12 +52,12 @@ def test_a_rest_pose_that_is_no_person_is_replaced_by_a_frame(skeleton, dance):
 
 def test_an_a_pose_at_rest_is_not_taken_for_a_t_pose(skeleton, dance):
     """Every limb points where the source's does, whatever the file calls rest."""
-    source = parse_bvh(dances.bvh_text(skeleton, dance))
+    source = dances.read_text(dances.bvh_text(skeleton, dance))
     rest = np.zeros((1, 55, 3))
     for side, out in (("left", 1), ("right", -1)):
         rest[0, skeleton.names.index(f"{side}_shoulder"), 2] = -out * 0.8
         rest[0, skeleton.names.index(f"{side}_hip"), 2] = out * 0.15
-    lowered = parse_bvh(dances.bvh_text(skeleton, Motion(24, rest, np.zeros((1, 3)))))
+    lowered = dances.read_text(dances.bvh_text(skeleton, Motion(24, rest, np.zeros((1, 3)))))
     source.rest_turns, source.rest_places = lowered.turns[0], lowered.places[0]
     got = onto(skeleton, source)
     limbs = [(skeleton.names.index(f"{s}_{a}"), skeleton.names.index(f"{s}_{b}")) for s in ("left", "right")
@@ -75,7 +75,7 @@ def angle(a, b):
 
 def test_fewer_and_more_spine_joints_bend_the_back_as_much(skeleton, dance):
     """A spine of one joint: the chest turns as the source's, the joints between share it."""
-    source = parse_bvh(dances.bvh_text(skeleton, dance))
+    source = dances.read_text(dances.bvh_text(skeleton, dance))
     keep = [i for i, n in enumerate(source.names) if n not in ("spine1", "spine2")]
     parents = source.parents.copy()
     parents[source.names.index("spine3")] = 0
@@ -92,7 +92,7 @@ def test_fewer_and_more_spine_joints_bend_the_back_as_much(skeleton, dance):
 
 def test_the_first_frame_faces_us_on_the_floor_at_the_origin(skeleton, dance):
     away = Rotation.from_rotvec([0, 2.5, 0])
-    moved = parse_bvh(dances.bvh_text(skeleton, dance, world=away))
+    moved = dances.read_text(dances.bvh_text(skeleton, dance, world=away))
     moved.places = moved.places + (7, 1.5, -3)
     got = onto(skeleton, moved)
     np.testing.assert_allclose(got.transl[0, [0, 2]], 0, atol=1e-6)
@@ -100,14 +100,14 @@ def test_the_first_frame_faces_us_on_the_floor_at_the_origin(skeleton, dance):
 
 
 def test_longer_legs_take_longer_steps(skeleton, dance):
-    source = parse_bvh(dances.bvh_text(skeleton, dance))
+    source = dances.read_text(dances.bvh_text(skeleton, dance))
     giant = dances.Skeleton(skeleton.names, skeleton.parents, skeleton.joints * 1.25)
     got = onto(giant, source)
     np.testing.assert_allclose(got.transl[:, [0, 2]], dance.transl[:, [0, 2]] * 1.25, atol=1e-4)
 
 
 def test_a_skeleton_that_is_no_person_names_what_is_missing(skeleton, dance):
-    source = parse_bvh(dances.bvh_text(skeleton, dance, [n.replace("left_elbow", "tentacle") for n in skeleton.names]))
+    source = dances.read_text(dances.bvh_text(skeleton, dance, [n.replace("left_elbow", "tentacle") for n in skeleton.names]))
     with pytest.raises(MotionError, match=r"it\.bvh: no joint for left_elbow .*tentacle"):
         onto(skeleton, source)
 
