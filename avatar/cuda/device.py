@@ -143,8 +143,3 @@ class Device:
         """From one marked event to the other."""
         _call("cuEventSynchronize", end)
         return float(_call("cuEventElapsedTime", begin, end))
-
-    def used(self) -> tuple[int, int]:
-        """Bytes of the GPU's memory in use, by any process, and in all."""
-        free, total = _call("cuMemGetInfo")
-        return int(total) - int(free), int(total)

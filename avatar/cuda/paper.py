@@ -18,8 +18,6 @@ NEAREST = 3
 """Gaussians of a neighbourhood, the gaussian itself included."""
 POSED, PULL = 10, 13
 """Numbers of a posed gaussian, and of its gradient by the neighbour term."""
-ROWS = {"mu": slice(0, 3), "quat": slice(3, 7), "scale_logit": slice(7, 10), "rgb": slice(10, 13)}
-"""Rows of Adam's moments on the device."""
 
 
 @dataclass

@@ -34,8 +34,6 @@ from gsac.benchmarks.unity.spirv import Program
 
 BACKGROUNDS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Display values of a grey background."""
-SKY = 4.0
-"""Linear light of a bright sky, 1 being white after exposure."""
 WAYS = ("direct", "refitted", "own", "behind")
 APART = 0.032
 """m, of each of a headset's eyes from their middle."""

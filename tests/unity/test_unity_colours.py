@@ -14,6 +14,8 @@ pytestmark = pytest.mark.slow
 
 SIZE = 192
 BACKGROUND = .5
+SKY = 4.0
+"""Linear light of a bright sky, 1 being white after exposure."""
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +55,7 @@ def test_a_linear_project_shows_the_trained_picture_at_40_db_whatever_lies_behin
 def test_before_a_bright_sky_the_copy_behind_gives_the_trained_edges_at_any_exposure(stage, shot, avatar, exposure):
     """What is drawn and what is copied are in the frame's exposure already: nothing is undone."""
     rgb, alpha = colours.trained_picture(shot, avatar.faces, avatar.gaussians)
-    sky = float(to_display(np.asarray(colours.SKY * exposure)))
+    sky = float(to_display(np.asarray(SKY * exposure)))
     want = rgb + (1 - alpha[..., None]) * sky
     known, unknown = (colours.decibels(stage.lay(shot, sky, known), want, alpha > colours.EDGE) for known in (True, False))
     print(f"sky of display value {sky:.2f}: {known:.1f} dB, without the copy {unknown:.1f}")

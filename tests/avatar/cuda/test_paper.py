@@ -9,6 +9,8 @@ from gsac.avatar.cuda import why_not
 
 pytestmark = pytest.mark.skipif(why_not() is not None, reason=f"CUDA path: {why_not()}")
 LIMIT, SWAPS = 1e-3, 1e-3
+ROWS = {"mu": slice(0, 3), "quat": slice(3, 7), "scale_logit": slice(7, 10), "rgb": slice(10, 13)}
+"""Rows of Adam's moments on the device."""
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +81,6 @@ def trainers(figure):
 
 @pytest.mark.parametrize("batch, text", [(1, False), (4, False), (4, True)])
 def test_every_gradient_of_a_step_is_that_of_the_cpu_path(trainers, batch, text):
-    from gsac.avatar.cuda.paper import ROWS
     from gsac.benchmarks.gpu.check import relative
 
     cuda, cpu, step, _ = trainers(batch, 110, paper_text=text)
