@@ -40,6 +40,8 @@ export class GsacAvatar extends Element {
     this.reflection = null;
     // Counts what was opened: only the last is shown.
     this.calls = 0;
+    // Done when nothing is being shown: each showing takes the stage's canvas.
+    this.shown = Promise.resolve();
     this.watch = new IntersectionObserver((seen) => { this.viewer.hidden = !seen.at(-1).isIntersecting; });
     const { viewer } = this;
     viewer.onChange = (text) => this.tell("note", text);
@@ -87,8 +89,7 @@ export class GsacAvatar extends Element {
 
   connectedCallback() {
     this.watch.observe(this);
-    if (this.file && !this.viewer.renderer) this.open(this.file).catch((error) => this.fail(error));
-    else if (this.file) this.viewer.run();
+    this.inTurn(() => this.wake()).catch((error) => this.fail(error));
   }
 
   disconnectedCallback() {
@@ -96,7 +97,21 @@ export class GsacAvatar extends Element {
     this.mirror(null);
     this.viewer.stop();
     // An element that is only moved comes back at once.
-    queueMicrotask(() => this.isConnected || this.viewer.dispose());
+    this.inTurn(() => this.isConnected || this.viewer.dispose());
+  }
+
+  // Does something once what is being shown is there.
+  inTurn(act) {
+    const done = this.shown.then(act);
+    this.shown = done.catch(() => {});
+    return done;
+  }
+
+  // Goes on in a page after having been in none.
+  async wake() {
+    if (!this.isConnected || !this.file) return;
+    if (this.viewer.renderer) this.viewer.run();
+    else await this.present(this.file, readAvatar(this.file), readOptions(this.given));
   }
 
   attributeChangedCallback(name, before, value) {
@@ -123,9 +138,10 @@ export class GsacAvatar extends Element {
 
   // Fetches avatar.gsac from an address and shows it.
   async load(address) {
-    const call = ++this.calls, answer = await fetch(address);
-    if (!answer.ok) throw new Error(`${address}: the server answers ${answer.status}`);
-    const bytes = await answer.arrayBuffer();
+    const call = ++this.calls, bytes = await fetchBytes(address).catch((error) => {
+      if (call === this.calls) throw error;
+      return null;
+    });
     if (call === this.calls) await this.open(bytes);
   }
 
@@ -135,10 +151,14 @@ export class GsacAvatar extends Element {
    * @param {import("./address.js").Options} options what of it is seen; default: as the attributes say
    */
   async open(bytes, options = readOptions(this.given)) {
-    const call = ++this.calls, avatar = readAvatar(bytes);
+    const avatar = readAvatar(bytes), call = ++this.calls;
+    await this.inTurn(() => (call === this.calls ? this.present(bytes, avatar, options) : null));
+  }
+
+  // Shows what was opened, whole, before anything else has its turn.
+  async present(bytes, avatar, options) {
     await this.mirror(null);
     await this.viewer.show(avatar, options.draw);
-    if (call !== this.calls) return;
     this.file = bytes;
     this.inside("message").hidden = this.inside("poster").hidden = true;
     const poses = this.poses.map((name) => new Option(`${name}-pose`, name));
@@ -321,4 +341,10 @@ export class GsacAvatar extends Element {
     viewer.look(/head|neck/.test(joint ?? "") ? "face" : joint);
     this.changed();
   }
+}
+
+async function fetchBytes(address) {
+  const answer = await fetch(address);
+  if (!answer.ok) throw new Error(`${address}: the server answers ${answer.status}`);
+  return answer.arrayBuffer();
 }

@@ -78,8 +78,9 @@ export class Viewer {
     // What is looked at, "face" or a joint; null: the whole figure.
     /** @type {string | null} */
     this.near = null;
-    // Whether it draws by and by; hidden: whether it is out of sight; filmed: whether each frame is drawn for a film.
-    this.running = false;
+    // What draws by and by, while it does; hidden: whether it is out of sight; filmed: whether each frame is drawn for a film.
+    /** @type {FrameRequestCallback | null} */
+    this.running = null;
     this.hidden = false;
     this.filmed = false;
     this.background = BACKGROUND;
@@ -301,10 +302,9 @@ export class Viewer {
   // Draws from now on whenever something changes; a headset's session draws by itself (xr.js).
   run() {
     if (this.running) return;
-    this.running = true;
     let last = null, shown = null;
     const frame = (now) => {
-      if (!this.running) return;
+      if (this.running !== frame) return;
       if (this.still || this.session || this.hidden) {
         last = shown = null;
         this.rate.reset();
@@ -323,11 +323,12 @@ export class Viewer {
       }
       requestAnimationFrame(frame);
     };
+    this.running = frame;
     requestAnimationFrame(frame);
   }
 
   stop() {
-    this.running = false;
+    this.running = null;
   }
 
   // Counts a frame; now: ms.

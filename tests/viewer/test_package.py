@@ -185,7 +185,7 @@ def test_methods_attributes_and_events_do_what_they_say(page, site):
     page.run("it.remove()")
     page.until("gsac.renderer === null")
     page.run("document.body.append(it)")
-    page.until("gsac.renderer !== null && gsac.running")
+    page.until("gsac.renderer !== null && gsac.running !== null")
     assert page.errors == []
 
 
