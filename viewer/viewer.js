@@ -130,9 +130,11 @@ export class Viewer {
     renderer.onLost = async (why) => {
       if (this.renderer !== renderer) return;
       this.dispose();
-      replaceCanvas(this.canvas);
+      const canvas = replaceCanvas(this.canvas);
       await new Promise((done) => setTimeout(done, RECOVER_MS));
-      this.take(await makeRenderer(renderer.kind === "webgpu" ? "webgl" : "software", this.canvas, this));
+      // Whoever shows an avatar meanwhile replaces the canvas; out of the page nobody needs a renderer.
+      if (this.canvas !== canvas || !canvas.isConnected) return;
+      this.take(await makeRenderer(renderer.kind === "webgpu" ? "webgl" : "software", canvas, this));
       this.move();
       this.draw();
       const way = this.renderer.kind === "webgl" ? "by WebGL" : "without the graphics card";

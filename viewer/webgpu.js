@@ -37,10 +37,16 @@ export class WebgpuRenderer {
     const device = await Promise.race([reachDevice(asked), late]);
     if (!device) return null;
     device.pushErrorScope("validation");
-    const renderer = new WebgpuRenderer(device, canvas, avatar, skin, levels);
-    await renderer.build();
-    const wrong = await device.popErrorScope();
-    if (wrong) throw new Error(wrong.message);
+    let renderer;
+    try {
+      renderer = new WebgpuRenderer(device, canvas, avatar, skin, levels);
+      await renderer.build();
+      const wrong = await device.popErrorScope();
+      if (wrong) throw new Error(wrong.message);
+    } catch (error) {
+      device.destroy();
+      throw error;
+    }
     device.lost.then(({ message }) => renderer.onLost(message));
     device.addEventListener("uncapturederror", ({ error }) => renderer.onLost(error.message));
     return renderer;

@@ -152,3 +152,25 @@ def test_an_element_that_was_moved_plays_no_faster(page):
       });
       return steps;""")
     assert 18 <= got <= 21
+
+
+def test_a_lost_renderer_takes_no_place_of_an_avatar_that_was_opened_since(page):
+    got = ask(page, """await it.open(first);
+      it.viewer.renderer.onLost("gone");
+      await it.open(second);
+      const { renderer } = it.viewer;
+      await wait(1300);
+      return [it.viewer.renderer === renderer, told.filter(([event]) => event === "note")];""")
+    assert got == [True, []]
+
+
+def test_a_renderer_that_is_lost_when_the_element_leaves_the_page_has_no_successor_until_it_is_back(page):
+    got = ask(page, """await it.open(first);
+      it.viewer.renderer.onLost("gone");
+      it.remove();
+      await wait(1300);
+      const left = it.viewer.renderer === null;
+      document.body.append(it);
+      await wait(300);
+      return [left, it.viewer.renderer !== null];""")
+    assert got == [True, True]

@@ -112,6 +112,21 @@ def test_what_stops_is_followed_by_the_next_way_with_the_same_picture(page, addr
 
 @needs_chromium
 @pytest.mark.slow
+def test_a_webgpu_that_does_not_begin_gives_the_card_back(page, address):
+    stops = "GPUDevice.prototype.createComputePipelineAsync = async () => { throw new Error('no such thing'); };" \
+            "window.back = 0; GPUDevice.prototype.destroy = () => { back += 1; };"
+    got = page.call("Page.addScriptToEvaluateOnNewDocument", source=f"if (window.GPU) {{ {CARD}; {stops} }}")
+    try:
+        page.open(f"{address}?back#pose=A&still")
+        if not page.has_webgpu():
+            pytest.skip("this chromium has no WebGPU")
+        assert page.run("back") == 1 and page.errors == []
+    finally:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=got["identifier"])
+
+
+@needs_chromium
+@pytest.mark.slow
 @pytest.mark.parametrize("broken", [
     "GPUDevice.prototype.createComputePipelineAsync = async () => { throw new Error('no such thing'); }",
     "GPUAdapter.prototype.requestDevice = async () => { throw new Error('no device'); }",
