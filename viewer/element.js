@@ -40,6 +40,8 @@ export class GsacAvatar extends Element {
     this.reflection = null;
     // Counts what was opened: only the last is shown.
     this.calls = 0;
+    // Counts the mirrors that were asked for, and their ends: only the last holds.
+    this.mirrors = 0;
     // Done when nothing is being shown: each showing takes the stage's canvas.
     this.shown = Promise.resolve();
     this.watch = new IntersectionObserver((seen) => { this.viewer.hidden = !seen.at(-1).isIntersecting; });
@@ -315,9 +317,18 @@ export class GsacAvatar extends Element {
    * @param {import("./mirror.js").Kit | null} kit
    */
   async mirror(kit) {
+    const call = ++this.mirrors;
     this.reflection?.end();
     this.reflection = null;
-    if (kit) this.reflection = await Mirror.start(this.viewer, kit);
+    if (kit) {
+      const mirror = await Mirror.start(this.viewer, kit, () => call === this.mirrors);
+      if (!mirror) return;
+      mirror.onFail = (error) => {
+        this.mirror(null);
+        this.tell("note", `The mirror has ended: ${error.message}`);
+      };
+      this.reflection = mirror;
+    }
     this.changed();
   }
 

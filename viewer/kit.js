@@ -43,10 +43,14 @@ export async function openKit(files) {
   const make = async (kind, pattern, more) => {
     const model = find(pattern);
     if (!model) return null;
-    const baseOptions = { modelAssetBuffer: new Uint8Array(await model.arrayBuffer()) };
-    return kind.createFromOptions(set, { baseOptions, runningMode: "VIDEO", ...more }).catch((error) => {
-      throw new MotionError(`Mirror: a network cannot be read (${error.message.split("\n")[0]})`);
-    });
+    try {
+      const baseOptions = { modelAssetBuffer: new Uint8Array(await model.arrayBuffer()) };
+      return await kind.createFromOptions(set, { baseOptions, runningMode: "VIDEO", ...more });
+    } catch (error) {
+      // MediaPipe also rejects with the event of a script that does not load.
+      const why = error.message?.split("\n")[0] ?? "MediaPipe does not start";
+      throw new MotionError(`Mirror: a network cannot be read (${why})`);
+    }
   };
   const actions = { outputFaceBlendshapes: true, outputFacialTransformationMatrixes: true };
   return { face: await make(vision.FaceLandmarker, FACE_FILE, actions), pose: await make(vision.PoseLandmarker, POSE_FILE, {}) };

@@ -27,6 +27,8 @@ export class Mirror {
     this.kit = kit;
     this.video = video;
     this.ended = false;
+    /** @type {(error: Error) => void} called when it cannot go on */
+    this.onFail = () => {};
     // What was seen last, and when, ms: weights by expression, and joint -> axis-angle, degrees.
     this.seen = { face: {}, head: {}, arms: {} };
     this.since = { face: -Infinity, arms: -Infinity };
@@ -40,14 +42,26 @@ export class Mirror {
    * Asks for the camera and follows it. Rejects where the user or the machine has none to give.
    * @param {import("./viewer.js").Viewer} viewer
    * @param {Kit} kit
+   * @param {() => boolean} wanted whether it still is, once the camera is there; null where it is not
    */
-  static async start(viewer, kit) {
+  static async start(viewer, kit, wanted) {
+    if (!viewer.avatar) throw new Error("no avatar is there yet");
     if (!kit.face && !kit.pose) throw new Error("a mirror needs a FaceLandmarker, a PoseLandmarker, or both");
     if (!navigator.mediaDevices) throw new Error("here the browser gives no camera; serve the page by https or from this machine");
     const stream = await navigator.mediaDevices.getUserMedia({ video: { facingMode: "user", width: 640, height: 480 } });
     const video = Object.assign(document.createElement("video"), { muted: true, playsInline: true, srcObject: stream });
-    await video.play();
     const mirror = new Mirror(viewer, kit, video);
+    for (const track of stream.getTracks()) track.addEventListener("ended", () => mirror.onFail(new Error("the camera is gone")));
+    try {
+      await video.play();
+    } catch (error) {
+      mirror.release();
+      throw error;
+    }
+    if (!wanted()) {
+      mirror.release();
+      return null;
+    }
     viewer.choose({ pose: "T" });
     viewer.seek(0);
     mirror.run();
@@ -58,7 +72,11 @@ export class Mirror {
   run() {
     const frame = (now) => {
       if (this.ended) return;
-      this.step(now);
+      try {
+        this.step(now);
+      } catch (error) {
+        this.onFail(error);
+      }
       requestAnimationFrame(frame);
     };
     requestAnimationFrame(frame);
@@ -90,10 +108,15 @@ export class Mirror {
       1 - Math.exp(-seconds / LIMB_S));
   }
 
-  // Gives the camera back; the avatar goes to its A-pose.
-  end() {
+  // Gives the camera back.
+  release() {
     this.ended = true;
     for (const track of /** @type {MediaStream} */ (this.video.srcObject).getTracks()) track.stop();
+  }
+
+  // Gives the camera back; the avatar goes to its A-pose.
+  end() {
+    this.release();
     this.viewer.expression = {};
     this.viewer.turned = {};
     this.viewer.choose({ pose: Object.hasOwn(this.viewer.avatar.poses, "A") ? "A" : "T" });

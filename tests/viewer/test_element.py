@@ -174,3 +174,54 @@ def test_a_renderer_that_is_lost_when_the_element_leaves_the_page_has_no_success
       await wait(300);
       return [left, it.viewer.renderer !== null];""")
     assert got == [True, True]
+
+
+def test_of_two_mirrors_that_are_asked_for_at_once_one_camera_stays_on_until_it_is_switched_off(page):
+    got = ask(page, """await it.open(first);
+      setAnswer(100);
+      await Promise.all([it.mirror(kit), it.mirror(kit)]);
+      const during = lit();
+      await it.mirror(null);
+      return [tracks.length, during, lit()];""")
+    assert got == [2, 1, 0]
+
+
+@pytest.mark.parametrize("end", ["it.mirror(null)", "it.remove()"])
+def test_a_mirror_that_ends_while_the_user_is_asked_leaves_no_camera_on(page, end):
+    got = ask(page, f"""await it.open(first);
+      it.play("walk");
+      setAnswer(100);
+      const asked = it.mirror(kit);
+      {end};
+      await asked;
+      return [tracks.length, lit(), it.reflection, it.viewer.playing];""")
+    assert got == [1, 0, None, {"clip": "walk"}]
+
+
+def test_a_camera_whose_picture_cannot_be_played_is_switched_off(page):
+    got = ask(page, """await it.open(first);
+      HTMLMediaElement.prototype.play = async () => { throw new Error("no play"); };
+      const said = await it.mirror(kit).catch((error) => error.message);
+      return [said, tracks.length, lit()];""")
+    assert got == ["no play", 1, 0]
+
+
+def test_without_an_avatar_a_mirror_asks_for_no_camera_and_says_why(page):
+    got = ask(page, "return [await it.mirror(kit).catch((error) => error.message), tracks.length];")
+    assert got == ["no avatar is there yet", 0]
+
+
+def test_a_network_that_fails_ends_the_mirror_in_a_sentence(page):
+    got = ask(page, """await it.open(first);
+      await it.mirror({ face: { detectForVideo: () => { throw new Error("out of memory"); } } });
+      await wait(300);
+      return [lit(), it.reflection, it.viewer.playing, told.at(-1)];""")
+    assert got == [0, None, {"pose": "A"}, ["note", "The mirror has ended: out of memory"]]
+
+
+def test_a_camera_that_is_pulled_out_ends_the_mirror_in_a_sentence(page):
+    got = ask(page, """await it.open(first);
+      await it.mirror(kit);
+      tracks[0].dispatchEvent(new Event("ended"));
+      return [lit(), it.reflection, told.at(-1)];""")
+    assert got == [0, None, ["note", "The mirror has ended: the camera is gone"]]

@@ -160,6 +160,18 @@ def test_the_page_says_which_file_is_missing(page):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("bundle", "why"), [
+    ("export const nothing = 1;", "createFromOptions"),
+    ("export const FaceLandmarker = { createFromOptions: () => Promise.reject(new Event('error')) };", "MediaPipe does not start")])
+def test_networks_that_do_not_begin_are_said(page, bundle, why):
+    give(page, {"tasks-vision.tgz": archive({"vision_bundle.mjs": bundle.encode(), "wasm/vision_wasm_internal.js": b"",
+                                             "wasm/vision_wasm_internal.wasm": b""}), "face_landmarker.task": b""})
+    page.until("!document.getElementById('note').textContent.includes('opening')")
+    note = page.run("document.getElementById('note').textContent")
+    assert note.startswith("Mirror: a network cannot be read (") and why in note and page.errors == []
+
+
+@pytest.mark.slow
 def test_with_the_files_that_the_user_gives_the_avatar_does_what_the_user_does_and_the_page_asks_for_nothing(page):
     before = len(page.requests)
     give(page, {"tasks-vision-0.10.tgz": archive({"vision_bundle.mjs": BUNDLE.encode(), "wasm/vision_wasm_internal.js": b"loader",
