@@ -225,10 +225,8 @@ export class Controls {
     }
     const { viewer, title } = this;
     try {
-      if (!viewer.length) viewer.turntable = true;
-      else viewer.seek(0);
-      viewer.paused = false;
       this.film = beginFilm(viewer);
+      viewer.beginRound();
       this.show();
       this.note(`Filming for ${viewer.round.toFixed(1)} s; Film again ends it`);
       const timer = setTimeout(this.film.stop, viewer.round * 1000), film = await this.film.done;

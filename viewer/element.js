@@ -303,12 +303,16 @@ export class GsacAvatar extends Element {
   }
 
   /**
-   * @param {number} seconds how long; default: once through the motion, or around the figure in a pose
+   * @param {number} [seconds] how long; default: once through the motion, from its beginning, or around the figure in a pose
    * @returns {Promise<Blob>} what is seen in that time, as WebM, or as MP4 where the browser writes no WebM
    */
-  film(seconds = this.viewer.round) {
-    const film = beginFilm(this.viewer);
-    setTimeout(film.stop, seconds * 1000);
+  film(seconds) {
+    const { viewer } = this, film = beginFilm(viewer);
+    if (seconds === undefined) {
+      viewer.beginRound();
+      this.changed();
+    }
+    setTimeout(film.stop, (seconds ?? viewer.round) * 1000);
     return film.done;
   }
 

@@ -35,7 +35,7 @@ export function beginFilm(viewer) {
     viewer.filmed = false;
     for (const track of stream.getTracks()) track.stop();
   });
-  viewer.filmed = true;
   recorder.start(500);
+  viewer.filmed = true;
   return { stop: () => recorder.state !== "inactive" && recorder.stop(), done };
 }

@@ -181,6 +181,13 @@ export class Viewer {
     return this.length || 360 / TURNTABLE_DEGREES_PER_S;
   }
 
+  // Begins what `round` times: the motion anew, or a turn around the figure.
+  beginRound() {
+    if (this.length) this.seek(0);
+    else this.turntable = true;
+    this.paused = false;
+  }
+
   // Whether the user asked the system for less motion.
   get calm() {
     return matchMedia("(prefers-reduced-motion: reduce)").matches;

@@ -225,3 +225,37 @@ def test_a_camera_that_is_pulled_out_ends_the_mirror_in_a_sentence(page):
       tracks[0].dispatchEvent(new Event("ended"));
       return [lit(), it.reflection, told.at(-1)];""")
     assert got == [0, None, ["note", "The mirror has ended: the camera is gone"]]
+
+
+def test_a_film_of_a_pose_goes_once_around_the_figure_and_one_of_a_motion_begins_with_it(page):
+    got = ask(page, """await it.open(first);
+      const { viewer } = it;
+      Object.defineProperty(viewer, "round", { value: 0.5 });
+      it.play("T");
+      const yaw = viewer.camera.yaw;
+      await it.film();
+      const turned = viewer.camera.yaw - yaw;
+      it.play("walk");
+      it.pause();
+      it.currentTime = it.duration - 0.01;
+      await it.film();
+      return [turned, it.paused, it.currentTime];""")
+    turned, paused, clock = got
+    assert 5 < turned < 60 and not paused and 0.2 < clock < 1
+
+
+def test_a_film_of_so_many_seconds_shows_what_is_seen(page):
+    got = ask(page, """await it.open(first);
+      it.play("T");
+      await it.film(0.3);
+      return [it.viewer.turntable, it.viewer.camera.yaw];""")
+    assert got == [False, 0]
+
+
+def test_a_film_that_does_not_begin_lets_the_figure_at_rest_be_drawn_once_again(page):
+    got = ask(page, """await it.open(first);
+      MediaRecorder.prototype.start = () => { throw new Error("no recorder"); };
+      let said = null;
+      try { await it.film(0.1); } catch (error) { said = error.message; }
+      return [said, it.viewer.filmed];""")
+    assert got == ["no recorder", False]
