@@ -164,7 +164,9 @@ export class Controls {
         await person.open(await readFile(avatar));
         this.nameAs(avatar.name.replace(/\.gsac$/i, ""));
       } else {
-        const added = await addMotions(this.viewer.avatar, files);
+        const { avatar } = this.viewer, added = await addMotions(avatar, files);
+        const gone = avatar !== this.viewer.avatar;
+        if (gone) throw new MotionError(`${files[0].name}: another avatar has come meanwhile; drop it again`);
         for (const clip of added) this.addButton(clip, { clip });
         person.play(added[0]);
         this.note(`${added.join(", ")}: put on this avatar`);

@@ -44,7 +44,7 @@ function readBvhMotions(bytes, where) {
 
 /**
  * Adds clips to the avatar; throws MotionError.
- * @param {import("./reader.js").Avatar} avatar
+ * @param {import("./reader.js").Avatar | undefined} avatar
  * @param {File[]} files motions, and buffers that belong to a .gltf
  * @returns {Promise<string[]>} the clips' names
  */
@@ -57,6 +57,7 @@ export async function addMotions(avatar, files) {
     }
     throw new MotionError(`${names}: a motion is read from .bvh, .fbx, .glb, .gltf and .vrma, an avatar from .gsac`);
   }
+  if (!avatar) throw new MotionError(`${motions[0].name}: no avatar is there that a motion could move`);
   const size = files.reduce((sum, file) => sum + file.size, 0);
   if (size > MOST_BYTES) throw new MotionError(`${files[0].name}: it has ${size} bytes; at most ${MOST_BYTES} are read`);
   /** @type {Object<string, Uint8Array>} */
@@ -79,16 +80,16 @@ export async function addMotions(avatar, files) {
     }
   }
   return found.map(({ name, clip }) => {
-    const label = freeName(avatar.clips, name.slice(0, 40) || "motion");
+    const label = freeName(avatar, name.slice(0, 40) || "motion");
     avatar.clips[label] = clip;
     return label;
   });
 }
 
-// The name, with a number after it where a clip has it already.
-function freeName(clips, name) {
+// The name, with a number after it where a clip or a pose has it already.
+function freeName({ clips, poses }, name) {
   let label = name;
-  for (let k = 2; label in clips; k++) label = `${name} ${k}`;
+  for (let k = 2; label in clips || label in poses; k++) label = `${name} ${k}`;
   return label;
 }
 

@@ -100,6 +100,13 @@ def test_a_dropped_bvh_plays_as_python_retargets_it(page, figure, skeleton, tmp_
     assert page.run("document.querySelector('#poses button[aria-pressed=true]').textContent") == f"dance {unit}"
 
 
+def test_a_motion_that_is_called_as_a_pose_leaves_the_poses_button_alone(page, figure, skeleton, tmp_path):
+    (tmp_path / "A.bvh").write_text(dances.bvh_text(skeleton, dance(figure)))
+    assert drop(page, tmp_path / "A.bvh") == "A 2: put on this avatar"
+    page.run("document.querySelector('#poses [data-pose=A]').click()")
+    assert page.run("gsac.playing") == {"pose": "A"}
+
+
 @pytest.mark.footage
 @pytest.mark.parametrize("name", ["dab", "jumping_jacks", "wave_hello"])
 def test_a_recorded_motion_plays_as_python_retargets_it(page, figure, name):

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from gsac.avatar.gsac_file.write import avatar_bytes
+from gsac.avatar.motion.source import Motion
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.viewer.page import page_bytes
+from support import dances
 from support.page_modules import expose
 
 pytestmark = [pytest.mark.slow,
@@ -63,6 +65,27 @@ def test_a_broken_avatar_is_refused_in_a_sentence_and_the_first_stays(page, othe
     page.until(f"{NOTE} !== ''")
     assert "5000" in page.run(NOTE)
     assert page.run("[document.getElementById('name').textContent, gsac.playing.clip]")[1] == "walk"
+
+
+def test_a_motion_that_is_read_while_another_avatar_comes_is_refused_in_a_sentence(page, figure):
+    skeleton = dances.Skeleton(figure.joint_names, figure.parents, figure.joints)
+    still = Motion(10.0, np.zeros((3, 55, 3), np.float32), np.zeros((3, 3), np.float32))
+    page.run("""const { arrayBuffer } = File.prototype, bytes = document.getElementById('person').file;
+      File.prototype.arrayBuffer = async function () {
+        await document.getElementById('person').open(bytes);
+        return arrayBuffer.call(this);
+      };""")
+    drop(page, "dance.bvh", dances.bvh_text(skeleton, still).encode())
+    page.until(f"{NOTE} !== ''")
+    assert page.run(NOTE) == "dance.bvh: another avatar has come meanwhile; drop it again"
+    assert page.run("document.querySelector('[data-clip=dance]')") is None and page.errors == []
+
+
+def test_without_an_avatar_a_motion_is_refused_in_a_sentence(page):
+    page.run("gsac.avatar = undefined")
+    drop(page, "dance.bvh", b"HIERARCHY")
+    page.until(f"{NOTE} !== ''")
+    assert page.run(NOTE) == "dance.bvh: no avatar is there that a motion could move"
 
 
 @pytest.mark.parametrize("name", ["avatar.ply", "avatar.spz"])
