@@ -216,7 +216,11 @@ export class Controls {
   // Offers what is seen as a PNG file.
   async savePicture() {
     const name = `${this.title}.png`;
-    saveFile(await takePicture(this.viewer), name);
+    try {
+      saveFile(await takePicture(this.viewer), name);
+    } catch (error) {
+      this.note(error.message);
+    }
   }
 
   // Films what is seen, until the motion is over or the button is pressed again, and offers the file.

@@ -337,9 +337,12 @@ export class GsacAvatar extends Element {
   }
 
   // Fills the screen with the element, or goes back.
-  fullscreen() {
-    const done = document.fullscreenElement ? document.exitFullscreen() : this.screen.requestFullscreen();
-    done.catch((error) => this.tell("note", `The browser refuses the full screen: ${error.message}`));
+  async fullscreen() {
+    try {
+      await (document.fullscreenElement ? document.exitFullscreen() : this.screen.requestFullscreen());
+    } catch (error) {
+      this.tell("note", `The browser refuses the full screen: ${error.message}`);
+    }
   }
 
   // Tells which limb a click means; x, y: px of the stage.

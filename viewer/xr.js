@@ -33,13 +33,13 @@ export async function offerHeadset(viewer, place, tell) {
 // Begins a session and draws it until it ends.
 async function enter(viewer, mode, button) {
   const session = await navigator.xr.requestSession(mode, { optionalFeatures: ["local-floor"] });
-  const renderer = headsetRenderer(viewer), { gl } = renderer;
-  session.addEventListener("end", () => {
-    viewer.session = null;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    button.setAttribute("aria-pressed", "false");
-  });
   try {
+    const renderer = headsetRenderer(viewer), { gl } = renderer;
+    session.addEventListener("end", () => {
+      viewer.session = null;
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+      button.setAttribute("aria-pressed", "false");
+    });
     await gl.makeXRCompatible();
     const layer = new XRWebGLLayer(session, gl, { antialias: false, depth: false, alpha: true });
     await session.updateRenderState({ baseLayer: layer });

@@ -26,7 +26,7 @@ class Session extends EventTarget {
   requestAnimationFrame(act) { this.next = act; return 1; }
   async updateRenderState() {}
   async requestReferenceSpace(kind) { return { kind }; }
-  async end() { this.next = null; this.dispatchEvent(new Event('end')); }
+  async end() { this.next = null; this.ended = true; this.dispatchEvent(new Event('end')); }
   show() { this.next(performance.now(), { getViewerPose: () => Headset.pose }); }
 }
 window.XRWebGLLayer = class { constructor() { this.framebuffer = null; } getViewport(view) { return view.box; } };
@@ -319,6 +319,13 @@ def test_a_picture_is_the_canvas_as_png(page):
     assert np.abs(image[3, 3].astype(int) - (0x3A, 0x60, 0x80)).max() <= 1 and red(image).any()
 
 
+def test_a_picture_that_the_browser_does_not_give_is_said(page):
+    page.run("{ const { canvas } = gsac; canvas.toBlob = (done) => { delete canvas.toBlob; done(null); }; }")
+    click(page, "picture")
+    page.until("document.getElementById('note').textContent === 'the browser gave no picture'")
+    page.run("document.getElementById('note').hidden = true")
+
+
 def test_another_size_of_the_page_frames_the_figure_again_unless_it_was_moved_by_hand(page):
     page.resize(700, 700)
     page.run("location.hash = 'pose=T&again'")
@@ -493,6 +500,20 @@ def test_where_the_page_draws_without_webgl_the_headset_gets_one_of_its_own(addr
         assert np.abs(pixels[2, 2] - (0x20, 0x40, 0x60)).max() <= 1 and red(pixels).any()
         page.run("Headset.session.end()")
         page.until("gsac.session === null")
+        assert page.errors == []
+    finally:
+        page.close()
+
+
+def test_a_headset_that_cannot_be_drawn_is_left_again_and_it_is_said(address):
+    page = chromium.Browser(SIZE, SIZE)
+    try:
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=HEADSET)
+        page.open(address + "?none#pose=T&draw=software")
+        page.run("HTMLCanvasElement.prototype.getContext = () => null")
+        click(page, "xr-vr")
+        page.until("document.getElementById('note').textContent.startsWith('VR did not start: this browser offers no WebGL2')")
+        assert page.run("[Headset.session.ended, gsac.session]") == [True, None]
         assert page.errors == []
     finally:
         page.close()

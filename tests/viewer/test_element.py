@@ -259,3 +259,12 @@ def test_a_film_that_does_not_begin_lets_the_figure_at_rest_be_drawn_once_again(
       try { await it.film(0.1); } catch (error) { said = error.message; }
       return [said, it.viewer.filmed];""")
     assert got == ["no recorder", False]
+
+
+def test_where_a_browser_has_no_full_screen_it_is_said(page):
+    got = ask(page, """await it.open(first);
+      it.screen.requestFullscreen = undefined;
+      it.inside("full").click();
+      await wait(50);
+      return told.at(-1);""")
+    assert got[0] == "note" and "full screen" in got[1]
