@@ -44,7 +44,7 @@ export class GsacAvatar extends HTMLElement {
   reset(): void;
   /** What is seen, as PNG. */
   picture(): Promise<Blob>;
-  /** What is seen for so long, by default once through the motion, as WebM or MP4. */
+  /** What is seen for so long, by default once through the motion or around the figure in a pose, as WebM or MP4. */
   film(seconds?: number): Promise<Blob>;
   /** The avatar does what the user does before the camera, until it is called with null. */
   mirror(kit: MirrorKit | null): Promise<void>;
