@@ -16,6 +16,7 @@ import os
 import re
 import shutil
 import tarfile
+import zipfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -123,6 +124,8 @@ def read_bundle(file: Path, store: Store) -> Bundle:
             _keep_papers(store, bundle, small)
             return bundle
     except (BundleError, WrongBytesError) as error:
+        if zipfile.is_zipfile(file):
+            raise BundleError(f"{file} is a zip, as `gsac pack` makes it; a bundle is what `gsac bundle export` writes") from error
         raise BundleError(f"{file} is no bundle that can be trusted: {error}; nothing of it was taken") from error
     except OSError as error:
         if error.filename == str(file):

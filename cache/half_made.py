@@ -36,7 +36,10 @@ def half_made(parent: Path) -> Iterator[tuple[Path, int]]:
     sweep(parent)
     while True:
         folder = parent / f".gsac-{secrets.token_hex(8)}"
-        folder.mkdir(mode=0o700)
+        try:
+            folder.mkdir(mode=0o700)
+        except OSError as error:  # of `parent`: nobody knows the name of this one
+            raise OSError(error.errno, error.strerror, str(parent)) from error
         try:
             descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         except FileNotFoundError:  # swept before it was locked

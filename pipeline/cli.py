@@ -9,7 +9,7 @@ import argparse
 import os
 import sys
 from functools import partial
-from typing import Any
+from typing import Any, NoReturn
 
 from gsac.pipeline import commands
 from gsac.pipeline.errors import attached_summary, exit_code, sentence
@@ -20,6 +20,9 @@ from gsac.pipeline.reporter import Verbosity
 from gsac.pipeline.versions import package_version
 from gsac.pipeline.wrapping import fit
 from gsac.stages.contract import BadInput, did_you_mean
+
+RUNNING = ("run", "demo", "batch", "stage")
+"""Commands that run stages."""
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -39,7 +42,8 @@ def _execute(argv: list[str]) -> ExitCode:
         arguments = make_parser(argv).parse_args(argv)
         return arguments.do(arguments)
     except KeyboardInterrupt as error:
-        said = "interrupted; finished stages are kept, and the same command goes on from there"
+        goes_on = "; finished stages are kept, and the same command goes on from there"
+        said = f"interrupted{goes_on if getattr(arguments, 'command', '') in RUNNING else ''}"
         return _give_up(said, ExitCode.INTERRUPTED, arguments, error)
     except BrokenPipeError:  # the reader of the answer has gone: the rest is dropped
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -83,7 +87,10 @@ def _add_verbosity(parser: argparse.ArgumentParser, default: Any = argparse.SUPP
 
 
 class _Parser(argparse.ArgumentParser):
-    """Of the program and, by argparse's own way, of each command: what it does not know it names itself."""
+    """Of the program and, by argparse's own way, of each command: what is wrong is one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        raise BadInput(f"{message}; `{self.prog} --help` tells what is taken")
 
     def parse_known_args(self, *given: Any) -> Any:
         found, unknown = super().parse_known_args(*given)

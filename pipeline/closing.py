@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
+import sys
 from pathlib import Path
 
 from gsac.pipeline.report.origin import read_origin
@@ -19,8 +21,14 @@ def closing_lines(folder: RunFolder) -> list[str]:
     lines = [f"verdict: {origin.verdict}"] if origin is not None and origin.verdict else []
     lines += [f"{name + ':':<8} {folder.root / path}" for name, path in RESULTS.items() if (folder.root / path).exists()]
     if (folder.root / RESULTS["viewer"]).exists():
-        lines.append(f"next:    gsac view {shlex.quote(shortest(folder.root))}")
+        lines.append(f"next:    {program()} view {shlex.quote(shortest(folder.root))}")
     return lines
+
+
+def program() -> str:
+    """`gsac`, or as it was called where that alone is not found."""
+    called = sys.argv[0]
+    return shlex.quote(called) if Path(called).name == "gsac" and shutil.which("gsac") is None else "gsac"
 
 
 def shortest(path: Path) -> str:

@@ -108,9 +108,7 @@ def plan_stage(
         return StagePlan(parts.stage, Reason.STOPPED, parts)
     if known:
         return StagePlan(parts.stage, Reason.LOST, parts)
-    before = store.previous(parts.stage, parts)
-    if shown is None and before is not None and not before.parts.inputs.items() & parts.inputs.items():
-        before = None  # of another clip: its parameters explain nothing
+    before = store.previous(parts.stage, parts) if shown is not None else None  # a folder that showed none has nothing changed
     changes = before.parts.diff(parts) if before is not None else []
     if not changes:
         return StagePlan(parts.stage, Reason.FIRST_RUN, parts)

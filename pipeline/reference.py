@@ -210,9 +210,10 @@ def _arguments(parser: argparse.ArgumentParser) -> list[argparse.Action]:
 
 
 def _synopsis(action: argparse.Action) -> str:
-    """`[--out DIR]`, `CLIP`, `[NAME ...]`"""
+    """`[--out DIR]`, `--out FILE` where it is required, `CLIP`, `[NAME ...]`"""
     words = " ".join(filter(None, [*action.option_strings[-1:], _operand(action)]))
-    return f"[{words}]" if action.option_strings or action.nargs in ("?", "*") else words
+    may_miss = not action.required if action.option_strings else action.nargs in ("?", "*")
+    return f"[{words}]" if may_miss else words
 
 
 def _operand(action: argparse.Action) -> str:

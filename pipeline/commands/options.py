@@ -73,11 +73,13 @@ def add_force(command: argparse.ArgumentParser) -> None:
 
 
 def require_free(file: Path, force: bool) -> None:
-    """BadInput where a file would be written over without --force, or where a folder is in its place."""
+    """BadInput where a file would be written over without --force, where a folder is in its place, or where none can be written."""
     if file.is_dir():
         raise BadInput(f"{file} is a folder; give the name of a file")
     if os.path.lexists(file) and not force:
         raise BadInput(f"{file} is there already; give another --out, or --force to write over it")
+    if not os.access(file.parent, os.W_OK):
+        raise BadInput(f"{file.parent} may not be written into; give another --out")
 
 
 def warn_stale(run_folder: RunFolder, say: Speaker, only: str = "") -> None:

@@ -17,7 +17,7 @@ from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.run_folder import RunFolder
-from gsac.stages.contract import BadInput, StageError
+from gsac.stages.contract import BadInput, StageError, did_you_mean
 
 if TYPE_CHECKING:
     import numpy as np
@@ -151,7 +151,8 @@ def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
     if Path(asked).is_file():
         return read_motion(Path(asked), avatar.joint_names, avatar.parents, avatar.joints)
     if asked not in avatar.clips:
-        raise BadInput(f"--motion {asked}: no such file, and the avatar's clips are: {', '.join(avatar.clips) or 'none'}")
+        raise BadInput(f"--motion {asked}: no such file{did_you_mean(asked, avatar.clips)}, and the avatar's clips are: "
+                       f"{', '.join(avatar.clips) or 'none'}")
     import numpy as np
 
     clip = avatar.clips[asked]

@@ -94,6 +94,17 @@ def test_a_misspelt_option_is_named_alone_with_the_nearest_one_of_its_command(ca
     assert words in said and "usage:" not in said and "draft" not in said
 
 
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["run", "clip.mp4", "--height", "1,78"], "argument --height: invalid float value: '1,78'; `gsac run --help` tells"),
+    (["bundle", "exprt"], "invalid choice: 'exprt' (choose from 'export', 'import'); `gsac bundle --help` tells"),
+    (["pack"], "the following arguments are required: DIR; `gsac pack --help` tells"),
+])
+def test_a_wrong_word_on_the_command_line_is_one_sentence_with_the_help_to_ask(capsys, arguments, words):
+    assert execute(arguments) == ExitCode.USAGE
+    said = capsys.readouterr().err
+    assert words in " ".join(said.split()) and "usage:" not in said
+
+
 def test_a_misspelt_parameter_of_ours_is_answered_with_its_name(capsys):
     assert execute(["run", "nowhere.mp4", "--set", "smplx.heigth_m="]) == ExitCode.USAGE
     assert "unknown parameter smplx.heigth_m (did you mean smplx.height_m?)" in capsys.readouterr().err

@@ -25,6 +25,12 @@ def test_a_finished_run_ends_with_its_verdict_the_paths_of_what_to_open_and_the_
         f"viewer:  {folder.root}/export/viewer.html", f"report:  {folder.root}/report.html", "next:    gsac view 'my avatar'"]
 
 
+def test_the_next_command_is_typed_as_this_one_was_where_the_name_alone_is_not_found(folder, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["/there/my bin/gsac", "run"])
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert closing_lines(folder)[-1] == "next:    '/there/my bin/gsac' view 'my avatar'"
+
+
 def test_a_run_that_stops_early_names_only_what_is_there(folder):
     (folder.root / "export" / "viewer.html").unlink()
     (folder.root / "export" / "avatar.gsac").unlink()

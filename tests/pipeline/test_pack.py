@@ -128,6 +128,22 @@ def test_results_that_are_not_up_to_date_go_along_with_a_warning(folder, capsys)
         assert warning in " ".join(said.err.split()) and warning not in said.out
 
 
+def test_a_folder_that_takes_no_files_is_named_before_any_work(folder, monkeypatch, capsys, tmp_path):
+    (tmp_path / "full").mkdir()
+    may = os.access
+    monkeypatch.setattr("os.access", lambda path, how: str(path) != str(tmp_path / "full") and may(path, how))
+    code, out, err = pack(capsys, folder, "--out", tmp_path / "full/a.zip")
+    assert code == 2 and not out and f"{tmp_path}/full may not be written into; give another --out" in " ".join(err.split())
+
+
+def test_a_packed_zip_is_told_from_a_bundle(folder, monkeypatch, capsys, tmp_path):
+    assert pack(capsys, folder)[0] == 0
+    monkeypatch.setenv("GSAC_CACHE", str(tmp_path / "other"))
+    assert execute(["bundle", "import", f"{folder.name}.zip"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "is a zip, as `gsac pack` makes it; a bundle is what `gsac bundle export` writes" in said
+
+
 def test_what_the_user_added_to_export_goes_along_hidden_files_and_the_zip_itself_do_not(folder, capsys):
     (folder / "export" / "note.txt").write_text("mine")
     (folder / "export" / ".thumbs").write_text("hidden")

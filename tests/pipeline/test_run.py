@@ -53,12 +53,14 @@ def test_the_folder_of_a_linked_clip_is_named_after_the_link(toy):
     assert toy.gsac("run", "ada.mp4", "--until", "cut").out == f"{toy.root}/ada-avatar\n"
 
 
-def test_the_first_run_of_another_clip_is_one_whatever_the_parameters(toy):
+def test_the_first_run_in_a_folder_is_one_whatever_the_parameters(toy):
     toy.ran()
     other = toy.root / "other.mp4"
     other.write_text("delta epsilon")
     plans = toy.gsac("run", other, "--dry-run", "--set", "cut.keep=7", "--json").json["stages"]
     assert plans[0]["reason"] == "first run"
+    plans = toy.gsac("run", toy.clip, "--out", "elsewhere", "--dry-run", "--set", "cut.keep=7", "--json").json["stages"]
+    assert plans[0]["reason"] == "first run", "as after `gsac check`, which splits by other parameters"
 
 
 def test_dry_run_writes_no_folder(toy):

@@ -163,8 +163,16 @@ def test_nothing_of_the_users_is_removed_by_a_run(case, word, finished, out, cap
 def test_a_folder_that_is_not_a_runs_is_refused_as_it_is(name, finished, out, tmp_path, capfd):
     put(tmp_path / "fresh" / name)
     assert execute(["run", str(finished.clip), "--out", str(tmp_path / "fresh")]) == ExitCode.USAGE
-    assert "choose another folder" in capfd.readouterr().err
+    assert "choose another --out" in capfd.readouterr().err
     assert [path.name for path in (tmp_path / "fresh").rglob("*") if path.is_file()] == [Path(name).name]
+
+
+def test_a_folder_of_photos_takes_no_results(finished, tmp_path, capfd):
+    for name in ("photos/1.jpg", "photos/2.JPG", "photos/notes.txt"):
+        put(tmp_path / name)
+    assert execute(["run", str(finished.clip), "--out", str(tmp_path / "photos")]) == ExitCode.USAGE
+    assert "photos holds 2 photos, a clip of its own" in " ".join(capfd.readouterr().err.split())
+    assert sorted(path.name for path in (tmp_path / "photos").iterdir()) == ["1.jpg", "2.JPG", "notes.txt"]
 
 
 @pytest.mark.parametrize("name", ["report.html", "metrics.json", "export/out.txt"])
