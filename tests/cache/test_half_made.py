@@ -101,3 +101,9 @@ def test_a_process_is_known_as_dead_by_number_start_and_boot():
     assert is_dead(" ".join((host, boot, space, number, "1"))) and is_dead(" ".join((host, "before", space, number, started)))
     assert not is_dead(" ".join(("other", "before", space, "1", "1")))
     assert not is_dead(" ".join((host, boot, "pid:[1]", number, "1")))
+
+
+def test_where_none_can_be_made_the_place_is_named_and_not_the_folder_that_nobody_asked_for(tmp_path):
+    with pytest.raises(FileNotFoundError) as refused, half_made(tmp_path / "gone"):
+        pass
+    assert refused.value.filename == str(tmp_path / "gone")

@@ -1,7 +1,9 @@
 """The command line itself: global options, suggestions for misspelt words, commands of packages above the engine."""
 
+import argparse
 import os
 import subprocess
+from types import SimpleNamespace
 
 import pytest
 
@@ -103,6 +105,17 @@ def test_a_wrong_word_on_the_command_line_is_one_sentence_with_the_help_to_ask(c
     assert execute(arguments) == ExitCode.USAGE
     said = capsys.readouterr().err
     assert words in " ".join(said.split()) and "usage:" not in said
+
+
+@pytest.mark.parametrize(("command", "goes_on"), [("run", True), ("batch", True), ("compare", False), ("render", False)])
+def test_only_commands_that_run_stages_say_after_ctrl_c_that_they_go_on(monkeypatch, capsys, command, goes_on):
+    def interrupted(arguments):
+        raise KeyboardInterrupt
+
+    parsed = argparse.Namespace(command=command, do=interrupted)
+    monkeypatch.setattr("gsac.pipeline.cli.make_parser", lambda argv: SimpleNamespace(parse_args=lambda argv: parsed))
+    assert execute([command]) == ExitCode.INTERRUPTED
+    assert ("the same command goes on from there" in capsys.readouterr().err) == goes_on
 
 
 def test_a_misspelt_parameter_of_ours_is_answered_with_its_name(capsys):
