@@ -16,7 +16,6 @@ import os
 import re
 import shutil
 import tarfile
-import zipfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -37,6 +36,8 @@ LARGEST_PAPER = 64 << 20
 MOST_MEMBERS = 10000
 LONGEST_NAME = 99
 """Bytes of a member's name: longer ones need headers that are not read."""
+ZIP = b"PK"
+"""First bytes of a zip."""
 RECORD = re.compile(r"actions/([\w.-]{1,40})/([0-9a-f]{64})\.json")
 OBJECT = re.compile(r"objects/([0-9a-f]{64})")
 PAPER = re.compile(r"papers/(consent|licences)/[^/\0]{1,80}")
@@ -124,13 +125,18 @@ def read_bundle(file: Path, store: Store) -> Bundle:
             _keep_papers(store, bundle, small)
             return bundle
     except (BundleError, WrongBytesError) as error:
-        if zipfile.is_zipfile(file):
-            raise BundleError(f"{file} is a zip, as `gsac pack` makes it; a bundle is what `gsac bundle export` writes") from error
-        raise BundleError(f"{file} is no bundle that can be trusted: {error}; nothing of it was taken") from error
+        why = "it is a zip, as `gsac pack` makes it" if _begins(file, ZIP) else error
+        raise BundleError(f"{file} is no bundle that can be trusted: {why}; nothing of it was taken") from error
     except OSError as error:
         if error.filename == str(file):
             raise
         raise from_os_error(error, store.root) from error
+
+
+def _begins(file: Path, mark: bytes) -> bool:
+    """Whether these are a file's first bytes: a bundle that is cut may well end as a zip, since results hold some."""
+    with file.open("rb") as stream:
+        return stream.read(len(mark)) == mark
 
 
 def papers_of(store: Store, clip: str) -> dict[str, Path]:

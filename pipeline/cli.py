@@ -21,7 +21,7 @@ from gsac.pipeline.versions import package_version
 from gsac.pipeline.wrapping import fit
 from gsac.stages.contract import BadInput, did_you_mean
 
-RUNNING = ("run", "demo", "batch", "stage")
+RUNNING = ("run", "demo", "batch", "stage", "bench")
 """Commands that run stages."""
 
 

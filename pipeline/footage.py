@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from gsac.stages.split.film import PHOTO_SUFFIXES, find_film
+from gsac.stages.split.film import find_film, find_photos
 
 HEADER_BYTES = 64 << 20
 """Largest header of a video that is read."""
@@ -61,8 +61,7 @@ def expect_footage(clip: Path, split: Any) -> Footage:
     fps, count, most = (getattr(split, name, None) for name in ("fps", "count", "max_height"))
     height = most or LIKELY_HEIGHT
     if clip.is_dir():
-        photos = sum(path.suffix.lower() in PHOTO_SUFFIXES and path.stem != "plate" for path in clip.iterdir())
-        return keep(Footage(max(1, photos), round(height * PHOTO_ASPECT), height, read=False), count, most)
+        return keep(Footage(max(1, len(find_photos(clip))), round(height * PHOTO_ASPECT), height, read=False), count, most)
     header = read_header(clip)
     if header is None:
         return Footage(count or LIKELY_FRAMES, round(height * VIDEO_ASPECT), height, read=False)

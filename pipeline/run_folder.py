@@ -32,7 +32,7 @@ from gsac.pipeline.params import to_yaml
 from gsac.pipeline.placing import are_real, is_known, is_link_to, keep_aside, link, place, stands_in_the_way
 from gsac.pipeline.project import Project, shipped_dag
 from gsac.stages.contract import BadInput
-from gsac.stages.split.film import PHOTO_SUFFIXES
+from gsac.stages.split.film import find_photos
 
 DAG, LOCK, PARAMS, RUN, METRICS, REPORT = "dvc.yaml", "dvc.lock", "params.yaml", "run.json", "metrics.json", "report.html"
 LOGS = "logs"
@@ -222,10 +222,10 @@ class RunFolder:
             except BadInput as e:
                 raise BadInput(f"{self.root} holds another project's {DAG} ({e}); choose another --out") from e
             return
-        photos = count_photos(self.root)
-        if photos > 1:
-            raise BadInput(f"{self.root} holds {photos} photos, a clip of its own, which would hold results then; choose another "
-                           "--out")
+        photos = find_photos(self.root) if self.root.is_dir() else []
+        if len(photos) > 1:
+            raise BadInput(f"{self.root} holds {len(photos)} photos, a clip of its own, which would hold results then; "
+                           "choose another --out")
         for name in (*project.graph.steps, PARAMS, RUN, METRICS, REPORT, LOGS, EVENTS, OLDER_EVENTS):
             if os.path.lexists(self.root / name):
                 raise BadInput(f"{self.root} is not the folder of a run and holds {name}, which would be written over; "
@@ -275,11 +275,6 @@ def avatar_name(clip: Path, number: int = 1) -> str:
     the first."""
     name = clip.name if clip.is_dir() else clip.stem
     return f"{name}{f'-{number}' if number > 1 else ''}-avatar"
-
-
-def count_photos(folder: Path) -> int:
-    """How many photos lie in a folder; 0 where it is none."""
-    return sum(path.suffix.lower() in PHOTO_SUFFIXES for path in folder.iterdir()) if folder.is_dir() else 0
 
 
 def text_digest(text: str | bytes) -> str:

@@ -18,8 +18,7 @@ def find_film(folder: Path) -> Path | None:
     """None where the folder has photos without masks, or not exactly one video."""
     if not folder.is_dir():
         return None
-    photos = {file.stem.lower() for file in _files(folder, PHOTO_SUFFIXES)}
-    if photos - {PLATE} and not (folder / MASKS).is_dir():
+    if find_photos(folder) and not (folder / MASKS).is_dir():
         return None
     videos = find_videos(folder)
     return videos[0] if len(videos) == 1 else None
@@ -28,6 +27,11 @@ def find_film(folder: Path) -> Path | None:
 def find_videos(folder: Path) -> list[Path]:
     """All videos of a folder."""
     return _files(folder, VIDEO_SUFFIXES)
+
+
+def find_photos(folder: Path) -> list[Path]:
+    """All photos of a folder but the plate."""
+    return [file for file in _files(folder, PHOTO_SUFFIXES) if file.stem.lower() != PLATE]
 
 
 def find_plates(folder: Path) -> list[Path]:

@@ -141,7 +141,7 @@ def test_a_packed_zip_is_told_from_a_bundle(folder, monkeypatch, capsys, tmp_pat
     monkeypatch.setenv("GSAC_CACHE", str(tmp_path / "other"))
     assert execute(["bundle", "import", f"{folder.name}.zip"]) == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert "is a zip, as `gsac pack` makes it; a bundle is what `gsac bundle export` writes" in said
+    assert "is no bundle that can be trusted: it is a zip, as `gsac pack` makes it; nothing of it was taken" in said
 
 
 def test_what_the_user_added_to_export_goes_along_hidden_files_and_the_zip_itself_do_not(folder, capsys):
