@@ -25,8 +25,8 @@ from gsac.cache.root import default_root
 
 FIRST_PARTY = "gsac"
 FILE_SUFFIXES = tuple(f".{s}" for s in (
-    "npz npy json cu cuh c h cpp cs js css html jinja glsl wgsl hlsl compute shader asmdef unity md".split()))
-MEMO_KIND = f"module 3 python {sys.version_info.major}.{sys.version_info.minor}"
+    "npz npy onnx json cu cuh c h cpp cs js css html jinja glsl wgsl hlsl compute shader asmdef unity md".split()))
+MEMO_KIND = f"module 4 python {sys.version_info.major}.{sys.version_info.minor}"
 """To be raised when `module_digest` reads sources in another way, so that no memo of the old way is used."""
 
 

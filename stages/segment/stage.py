@@ -26,8 +26,9 @@ from gsac.stages.segment.brought import MASKS, hand_on, refuse_inverted
 from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
 from gsac.stages.segment.correction import LIKELY, correct, match_scene
+from gsac.stages.segment.edge_network import CloseUp, find_alpha, open_edge_network
 from gsac.stages.segment.grabcut import cut_out
-from gsac.stages.segment.matting import BAND, soften
+from gsac.stages.segment.matting import settle
 from gsac.stages.segment.network import PersonMask, PoseMask, SelfieMask, person_region
 from gsac.stages.segment.plate import HALF, Plate, compare
 from gsac.stages.segment.plate_from_video import learn_plate, relearn_plate
@@ -38,7 +39,8 @@ LABELS = "labels"
 """Folder of the alpha that holds a network's labels."""
 WIDE = 0.25
 """Margin around the person in which the scene is compared with the plate, as a share of the person's height."""
-
+REACH = 4
+"""px about a corrected outline within which a soft alpha that was brought is found anew."""
 LEAST = 0.05
 """Probability from which on a pixel may be the person."""
 MOSTLY = 0.5
@@ -58,8 +60,8 @@ class Cutout(NamedTuple):
     """(133, 2) px from the part's corner."""
     score: np.ndarray
     """(133,)."""
-    likely: np.ndarray
-    """(h, w / 8) uint8, its bits: where the network is sure enough for clothes that look like the scene."""
+    probability: np.ndarray
+    """(h, w) uint8, the network's, 255: certainly the person."""
     soft: np.ndarray | None = None
     """(h, w) half in 0..1, the alpha of a network whose edge is soft already."""
 
@@ -92,8 +94,10 @@ def run(job: Job) -> None:
 
 
 def warm(device: str) -> None:
-    """Loads the loops of the soft edge, or compiles them the very first time; called while a stage before is at work."""
-    soften(np.zeros((9, 9, 3), np.uint8), np.eye(9, dtype=np.float32))
+    """Reads the network of the soft edge, and loads the loops of its matting, or compiles them the very first time; called while a
+    stage before is at work."""
+    open_edge_network()
+    settle(np.zeros((9, 9, 3), np.uint8), np.full((9, 9), 0.5, np.float32))
 
 
 def use_brought(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray]) -> np.ndarray:
@@ -243,7 +247,7 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
         here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
     xy = xy - corner
     outline = keep_person(cut_out(image[part], probability[part], xy, score, iterations, here), xy, score) > 0.5
-    cutout = Cutout(box, outline, image[part].copy(), xy, score, np.packbits(probability[part] > LIKELY, axis=1))
+    cutout = Cutout(box, outline, image[part].copy(), xy, score, to_bytes(probability[part]))
     return cutout, plate is None or here is not None
 
 
@@ -263,8 +267,7 @@ def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: 
         x0, y0, x1, y1 = wide = around(kept, margin=WIDE) or box
         fits = compare(image[y0:y1, x0:x1], half_of(plate, wide), kept[y0:y1, x0:x1]) is not None
     soft = kept[part]
-    likely = np.packbits(soft > LIKELY, axis=1)
-    return Cutout(box, soft > 0.5, image[part].copy(), xy - box[:2], score, likely, soft.astype(np.float16)), fits
+    return Cutout(box, soft > 0.5, image[part].copy(), xy - box[:2], score, to_bytes(soft), soft.astype(np.float16)), fits
 
 
 def nobody(image: np.ndarray, xy: np.ndarray, score: np.ndarray) -> Cutout:
@@ -281,26 +284,44 @@ def keep_labels(labels: np.ndarray, cutout: Cutout) -> np.ndarray:
     return kept
 
 
+def to_bytes(probability: np.ndarray) -> np.ndarray:
+    """probability: (...) 0..1. Returns it as uint8 (...), 255 for 1."""
+    return (probability * 255 + 0.5).astype(np.uint8)
+
+
+def close_up(cutout: Cutout, plate: Plate | None) -> CloseUp:
+    """What the network of the soft edge is shown: the outline corrected where the plate shows the frame's scene."""
+    outline, part = cutout.outline, cutout.image
+    scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
+    if scene is not None:
+        bones = distance_to_bones(outline.shape, cutout.xy, cutout.score)
+        outline = correct(part, outline, scene, bones, cutout.probability > LIKELY * 255)
+    return CloseUp(part, outline, cutout.probability, scene)
+
+
+def soften(seen: CloseUp) -> np.ndarray:
+    """Alpha (h, w) float32 of the part that is seen."""
+    return settle(seen.image, find_alpha(seen))
+
+
 def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.ndarray:
     """Alpha (H, W) float32 of a frame: the outline, corrected where the plate shows the scene, with a soft edge. shape: H, W.
 
     An edge that was soft already stays but where the outline was corrected.
     """
     alpha = np.zeros(shape, np.float32)
-    outline = cutout.outline
-    if not outline.any():
+    if not cutout.outline.any():
         return alpha
     x0, y0, x1, y1 = cutout.box
-    part = cutout.image
-    scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
-    if scene is not None:
-        bones = distance_to_bones(outline.shape, cutout.xy, cutout.score)
-        likely = np.unpackbits(cutout.likely, axis=1, count=outline.shape[1]) > 0
-        outline = correct(part, outline, scene, bones, likely)
-    alpha[y0:y1, x0:x1] = soften(part, outline.astype(np.float32), scene) if cutout.soft is None else cutout.soft
-    if cutout.soft is not None and scene is not None:
-        near = cv2.dilate((outline != cutout.outline).astype(np.uint8), np.ones((2 * BAND + 1, 2 * BAND + 1), np.uint8)) > 0
-        alpha[y0:y1, x0:x1][near] = soften(part, outline.astype(np.float32), scene)[near]
+    seen = close_up(cutout, plate)
+    if cutout.soft is None:
+        alpha[y0:y1, x0:x1] = soften(seen)
+        return alpha
+    alpha[y0:y1, x0:x1] = cutout.soft
+    corrected = (seen.outline != cutout.outline).astype(np.uint8)
+    if corrected.any():
+        near = cv2.dilate(corrected, np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)) > 0
+        alpha[y0:y1, x0:x1][near] = soften(seen)[near]
     return alpha
 
 

@@ -2,10 +2,8 @@
 
 import cv2
 import numpy as np
-import pytest
 
-from gsac.stages.segment import matting
-from gsac.stages.segment.matting import BAND, HOLD, NOISE, share_of_colours, soften
+from gsac.stages.segment.matting import HOLD, NOISE, settle
 from gsac.stages.segment.matting_kernels import matting_rows, solve_rows
 
 SIZE = 14
@@ -67,33 +65,31 @@ def test_the_solver_finds_the_alpha_of_these_rows():
     np.testing.assert_allclose(alpha, wanted, atol=2e-4)
 
 
-@pytest.mark.parametrize(("off", "stripes", "share"), [(3, 0, 0.2), (1, 20, 0.6)])
-def test_an_outline_that_is_off_and_a_striped_wall_cost_less_than_by_colours_within_two_pixels(monkeypatch, off, stripes, share):
-    size, rng = 160, np.random.default_rng(1)
-    disc = np.zeros((8 * size, 8 * size), np.float32)
-    cv2.circle(disc, (4 * size, 4 * size), 360, 1, -1)
-    truth = cv2.resize(disc, (size, size), interpolation=cv2.INTER_AREA)
+def disc(size=160, noise=2.0):
+    """A disc before a wall, both of smooth colours: image (size, size, 3) uint8, its true alpha (size, size)."""
+    big = np.zeros((8 * size, 8 * size), np.float32)
+    cv2.circle(big, (4 * size, 4 * size), 360, 1, -1)
+    truth = cv2.resize(big, (size, size), interpolation=cv2.INTER_AREA)
     across = np.linspace(0, 1, size)
     person = 90 + 60 * across[:, None, None] * np.array([1, 0.6, 0.3])
-    wall = 170 + 40 * across[None, :, None] * np.array([0.4, 1, 0.8]) + stripes * np.sin(size / 3 * across)[None, :, None]
-    image = truth[..., None] * person + (1 - truth[..., None]) * wall + rng.normal(0, 2, (size, size, 3))
-    image = np.clip(np.round(image), 0, 255).astype(np.uint8)
-    outline = cv2.warpAffine((truth > 0.5).astype(np.float32), np.float32([[1, 0, off], [0, 1, 0]]), (size, size))
-
-    def cost(alpha):
-        return ((alpha - truth) ** 2).sum()
-
-    softened = cost(soften(image, outline))
-    monkeypatch.setattr(matting, "NEAR", 2)  # as far as colours alone reach
-    assert softened < share * cost(share_of_colours(image, outline))
+    wall = 170 + 40 * across[None, :, None] * np.array([0.4, 1, 0.8])
+    image = truth[..., None] * person + (1 - truth[..., None]) * wall
+    image += np.random.default_rng(1).normal(0, noise, image.shape)
+    return np.clip(np.round(image), 0, 255).astype(np.uint8), truth
 
 
-def test_only_the_band_is_soft_and_a_picture_without_an_edge_stays():
+def test_an_edge_that_the_network_blurs_is_settled_by_the_colours():
+    image, truth = disc()
+    blurred = cv2.GaussianBlur(truth, (0, 0), 1)
+    assert ((settle(image, blurred) - truth) ** 2).sum() < 0.5 * ((blurred - truth) ** 2).sum()
+
+
+def test_where_the_network_is_sure_nothing_changes():
     image = np.random.default_rng(2).integers(0, 256, (60, 60, 3)).astype(np.uint8)
-    outline = np.zeros((60, 60), np.float32)
-    outline[:, :30] = 1
-    alpha = soften(image, outline)
-    assert (alpha[:, : 30 - BAND] == 1).all() and (alpha[:, 30 + BAND:] == 0).all()
+    alpha = np.zeros((60, 60), np.float32)
+    alpha[:, :30], alpha[:, 30] = 1, 0.5
+    settled = settle(image, alpha)
+    assert (settled[:, :30] == 1).all() and (settled[:, 31:] == 0).all()
     for flat in (0, 1):
-        assert (soften(image, np.full((60, 60), flat, np.float32)) == flat).all()
-    assert soften(image[:2], outline[:2]).shape == (2, 60)
+        assert (settle(image, np.full((60, 60), flat, np.float32)) == flat).all()
+    assert settle(image[:2], alpha[:2]).shape == (2, 60)

@@ -13,7 +13,6 @@ from gsac.stages.segment import STAGE
 from gsac.stages.segment.components import keep_person
 from gsac.stages.segment.config import MODELS, Method
 from gsac.stages.segment.grabcut import cut_out
-from gsac.stages.segment.matting import soften
 from gsac.stages.segment.network import onto_frame, person_region
 from gsac.stages.segment.plate import Plate, compare
 from gsac.stages.segment.plate_from_video import masked_median
@@ -105,23 +104,6 @@ def test_fingers_that_the_network_lost_come_back_from_the_hands_points():
     lost = (fingers > 0) & (truth < 0.5)
     assert (cut_out(image, rough(truth), xy, score, 1) > 0.5)[lost].mean() > 0.8
     assert (cut_out(image, rough(truth), *NO_POINTS, 1) > 0.5)[lost].mean() < 0.5
-
-
-def test_the_soft_edge_is_the_share_of_the_person_in_the_pixel():
-    truth = figure()
-    image = painted(truth, scene(), noise=1.0)
-    alpha = soften(image, (truth > 0.5).astype(np.float32))
-    band = (truth > 0.05) & (truth < 0.95)
-    assert np.abs(alpha - truth)[band].mean() < 0.06
-    assert np.abs((truth > 0.5) - truth)[band].mean() > 0.2
-    assert alpha.min() == 0 and alpha.max() == 1 and alpha.dtype == np.float32
-
-
-def test_where_both_sides_look_alike_the_edge_keeps_the_outline():
-    truth = figure()
-    flat = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
-    alpha = soften(flat, (truth > 0.5).astype(np.float32))
-    assert iou(alpha > 0.5, truth > 0.5) > 0.98
 
 
 def test_islands_without_points_are_dropped_and_parts_with_points_kept(points):
