@@ -81,9 +81,9 @@ class Child:
 
     def close(self) -> None:
         """Kills the process group and removes its temporary files; what it was writing is private and is dropped."""
-        if self._events >= 0:
-            os.close(self._events)
-            self._events = -1
+        events, self._events = self._events, -1
+        if events >= 0:
+            os.close(events)
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
@@ -98,9 +98,9 @@ class Child:
     def follow(self, on_event: Callable[[dict], None]) -> dict[str, Any]:
         """Waits until the order is done. Returns the fields of the `done` event; raises BadInput, StageError or StageBugError as
         the stage failed."""
-        end, events = None, os.fdopen(self._events)
-        self._events = -1
-        with events:
+        # Given up before it is opened: what is interrupted in between would be closed twice.
+        end, number, self._events = None, self._events, -1
+        with os.fdopen(number) as events:
             for line in events:
                 event = json.loads(line)
                 if event["event"] in ("done", "failed"):
