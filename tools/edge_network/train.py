@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from augment import augment
-from network import PLANES, EdgeNetwork, export
+from network import OUTLINE, PLANES, EdgeNetwork, export
 
 BATCH = 64
 RATE, WARM_UP, FALL = 1.5e-3, 200, 0.9
@@ -39,7 +39,7 @@ def judge(network: EdgeNetwork, patches: torch.Tensor) -> float:
         x = some.permute(0, 3, 1, 2).float() / 255
         truth = x[:, PLANES:]
         ours += ((torch.sigmoid(network(x[:, :PLANES])) - truth) ** 2).sum().item()
-        outlines += ((x[:, 7:8] - truth) ** 2).sum().item()
+        outlines += ((x[:, OUTLINE: OUTLINE + 1] - truth) ** 2).sum().item()
     return ours / outlines
 
 

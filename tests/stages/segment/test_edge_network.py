@@ -1,4 +1,4 @@
-"""The edge network on painted pictures whose truth is known; tests/promises judges masks of a rendered person."""
+"""The edge network on painted pictures whose truth is known; `test_segment_stage.py` judges it on a rendered person."""
 
 import cv2
 import numpy as np

@@ -160,7 +160,7 @@ def test_a_gap_that_the_network_fills_is_open_in_a_video_whose_other_frames_show
 
 @pytest.mark.footage
 @pytest.mark.slow
-def test_truth_a_is_cut_out_with_an_iou_of_at_least_0_97(tmp_path):
+def test_truth_a_is_cut_out_without_a_plate_closer_than_matting_alone_does(tmp_path):
     source = FOOTAGE / "truth-a"
     if not source.exists():
         pytest.skip("footage truth-a is not here")
@@ -170,7 +170,7 @@ def test_truth_a_is_cut_out_with_an_iou_of_at_least_0_97(tmp_path):
     except ModelMissingError as missing:
         pytest.skip(str(missing))
     joints = np.load(source / "truth.npz", allow_pickle=True)["coco2d"]
-    overlaps, softness = [], []
+    overlaps, errors = [], []
     reader = cv2.VideoCapture(str(source / "clip.mp4"))
     for i in range(60):
         image = cv2.cvtColor(reader.read()[1], cv2.COLOR_BGR2RGB)
@@ -181,8 +181,9 @@ def test_truth_a_is_cut_out_with_an_iou_of_at_least_0_97(tmp_path):
         said = network(image, stage.person_region(xy, score))
         cutout, _ = stage.cut_frame(image, said, xy, score, None, SegmentConfig().iterations)
         alpha = stage.finish(cutout, image.shape[:2], None)
-        truth = cv2.imread(str(source / f"mask/{i:04d}.png"), cv2.IMREAD_GRAYSCALE) > 127
-        overlaps.append(((alpha > 0.5) & truth).sum() / ((alpha > 0.5) | truth).sum())
-        softness.append(np.abs(alpha - truth).sum() / truth.sum())
-    assert np.mean(overlaps) >= 0.97 and np.min(overlaps) >= 0.94
-    assert np.mean(softness) < 0.035
+        truth = cv2.imread(str(source / f"mask/{i:04d}.png"), cv2.IMREAD_GRAYSCALE) / 255
+        ours, true = alpha > 0.5, truth > 0.5
+        overlaps.append((ours & true).sum() / (ours | true).sum())
+        errors.append(((alpha - truth) ** 2).sum() / true.sum())
+    assert np.mean(overlaps) >= 0.983 and np.min(overlaps) >= 0.955  # matting of the outline alone: .981 and .950
+    assert np.mean(errors) < 0.011  # that: .0133
