@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from gsac.stages.contract import BadInput
+from gsac.stages.counting import counted
 from gsac.stages.findings import Code, Finding
 from gsac.stages.mask_place import HELD, share_held
 from gsac.stages.smplx.silhouette import Outline
@@ -45,6 +47,14 @@ def find_lost_frames(fit: Fit, seen: np.ndarray, height: float, own: np.ndarray)
     return {REPEATED: ~own, "no person is seen": own & ~seen,
             f"the body covers the silhouette badly (IoU below {POOR_IOU})": uncovered,
             f"the body lies more than {FAR:.0%} of its height off the seen points": away}
+
+
+def refuse_lost(lost: dict[str, np.ndarray]) -> None:
+    """Raises BadInput where no frame is left. lost: reason -> frames (T,) bool."""
+    if np.any(list(lost.values()), axis=0).all():
+        told = "; ".join(f"{reason} in {mask.sum()}" for reason, mask in lost.items() if mask.any())
+        raise BadInput(f"The body fits none of the clip's {counted(len(lost[REPEATED]), 'frame')}: {told}; film one whole person from "
+                       "head to feet, upright, and look whether masks, points or poses that you bring are this clip's")
 
 
 def is_mostly_loose(iou: np.ndarray) -> bool:

@@ -22,7 +22,7 @@ from gsac.stages.smplx.flame_motion import read_shared
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside
 from gsac.stages.smplx.lm.hidden_arms import describe_arms
 from gsac.stages.smplx.lm.misleading_outlines import fit_unmisled
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_beside, find_lost_frames, notes_that_hold
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_beside, find_lost_frames, notes_that_hold, refuse_lost
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outlines
 from gsac.stages.smplx.start.bring import bring_start
@@ -94,6 +94,7 @@ def run(job: Job) -> None:
     params.joints = body.posed_joints(params)
     params.sigma_joints = fit.sigma_joints.astype(np.float32)
     lost = find_lost_frames(fit, seen, sightings.person_height, own)
+    refuse_lost(lost)
     fitted = ~np.any(list(lost.values()), axis=0)
     params.sigma_joints[~fitted] = LOST
     for finding in (*notes_that_hold((*fit.notes, *describe_arms(fit.arms, fitted), *hidden), beside, seen & own),

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import LOST, Body, BodyParams
+from gsac.stages.contract import BadInput
 from gsac.stages.findings import Code, Finding
-from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, is_mostly_loose, notes_that_hold
+from gsac.stages.smplx.lost_frames import describe_lost_frames, find_lost_frames, is_mostly_loose, notes_that_hold, refuse_lost
 from gsac.stages.smplx.state import Fit
 
 HEIGHT = 1000.0
@@ -47,6 +48,18 @@ def test_a_body_off_its_points_is_lost_with_another_reason(good):
     lost, words = said(replace(good, reprojection=off))
     assert np.flatnonzero(lost).tolist() == [2, 3]
     assert "2 of 10 frames (2-3)" in words[0] and "off the seen points" in words[0]
+
+
+def test_a_clip_without_a_fitted_frame_is_refused_by_its_reasons(good):
+    off = good.reprojection.copy()
+    off[2:] = 80
+    lost = find_lost_frames(replace(good, reprojection=off), np.arange(10) > 1, HEIGHT, np.ones(10, bool))
+    with pytest.raises(BadInput, match=r"none of the clip's 10 frames: no person is seen in 2; .* in 8; film one whole person"):
+        refuse_lost(lost)
+
+
+def test_a_clip_with_one_fitted_frame_is_not_refused(good):
+    refuse_lost(find_lost_frames(good, np.arange(10) == 4, HEIGHT, np.ones(10, bool)))
 
 
 def test_frames_without_a_person_are_lost_whatever_their_numbers(good):
