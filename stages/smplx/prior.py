@@ -72,8 +72,8 @@ def motion_prior(joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 CLOTHES = {"chest": (4, 8), "belly": (4, 8), "waist": (10, 10), "upper arms": (3, 8), "sleeves": (1.5, 8), "forearms": (1.5, 6),
-           "thighs": (4, 8), "shanks": (4, 12), "cuffs": (2.5, 10), "feet": (2.5, 8), "soles": (5, 10), "hair": (5, 15),
-           "nape": (1.5, 15)}
+           "thighs": (4, 8), "shanks": (4, 12), "cuffs": (2.5, 10), "feet": (2.5, 8), "soles": (5, 10), "hair": (15, 15),
+           "nape": (10, 15)}
 """Distance of clothes and hair from the skin, mm: mean and spread over people in clothes and without."""
 
 

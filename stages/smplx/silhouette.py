@@ -73,9 +73,9 @@ def make_outline(alpha: np.ndarray) -> Outline:
     small = cv2.resize(alpha, size, interpolation=cv2.INTER_AREA)
     mask = small > 0.5
     mask &= not mask.all()  # how far it is to an edge that is nowhere would be infinite
-    outside = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5)
-    inside = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    field = (cv2.GaussianBlur(outside - inside, (0, 0), 1.0) * scale).astype(np.float32)
+    outside, inside = (cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (~mask, mask))
+    distance = np.where(mask, 0.5 - inside, outside - 0.5)  # OpenCV's are to the other side's pixel, half a pixel behind the edge
+    field = (cv2.GaussianBlur(distance, (0, 0), 1.0) * scale).astype(np.float32)
     slope = np.stack([cv2.Sobel(field, cv2.CV_32F, 1, 0, ksize=3), cv2.Sobel(field, cv2.CV_32F, 0, 1, ksize=3)]) / (8 * scale)
     return Outline(field, slope, scale, float(mask.mean()), mask)
 
