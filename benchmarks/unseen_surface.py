@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body, BodyParams
@@ -42,13 +43,21 @@ class Scene(NamedTuple):
     params: BodyParams
     """Pose, joints and camera."""
     vertices: np.ndarray
-    """(T, V, 3) m, camera frame."""
+    """(T, N, 3) m, camera frame."""
+    faces: np.ndarray
+    """(F, 3) into N."""
+    part: np.ndarray
+    """(N,) of `parts_of_vertices`."""
 
     @classmethod
     def read(cls, folder: Path, body: Body) -> Scene:
-        """Of a turntable's folder."""
+        """Of a turntable's folder: the surface as drawn where its truth holds it, else the bare body."""
         truth = folder / "truth.npz"
-        return cls(read_true_params(truth, body.digest), read_arrays(truth)["vertices"])
+        params, arrays, part = read_true_params(truth, body.digest), read_arrays(truth), parts_of_vertices(body)
+        if "drawn" not in arrays:
+            return cls(params, arrays["vertices"], body.faces, part)
+        _, below = KDTree(arrays["vertices"][0]).query(arrays["drawn"][0])
+        return cls(params, arrays["drawn"], arrays["drawn_faces"], part[below])
 
     @property
     def camera(self) -> Camera:
@@ -60,18 +69,21 @@ class Scene(NamedTuple):
 def measure(body: Body, fit: BodyParams, clip: Scene, unseen: Scene) -> dict[str, np.ndarray]:
     """Part -> (n,) px by which the fit's surface misses the truth's in `unseen`, over points that both show there.
 
-    fit: of the clip's frames.
+    fit: of the clip's frames. Raises ValueError where only one of the scenes has the surface as drawn.
     """
+    if clip.vertices.shape[1] != unseen.vertices.shape[1]:
+        raise ValueError("the clip's surface has other vertices than that of the unseen poses; make both of one seed, both with or "
+                         "both without --drawn")
     posed = transfer_poses(fit, unseen.params, body)
     own, true = posed.camera(unseen.camera.width, unseen.camera.height), unseen.camera
     places = body.posed(posed)[0]
-    depths = [(rasterise(mine, body.faces, own)[2], rasterise(theirs, body.faces, true)[2])
+    depths = [(rasterise(mine, body.faces, own)[2], rasterise(theirs, unseen.faces, true)[2])
               for mine, theirs in zip(places, unseen.vertices, strict=True)]
     part, misses = parts_of_vertices(body), {name: [np.zeros(0)] for name in (*PARTS, "hands")}
     for t in facing_frames(clip.params):
         which, face, bary = correspond(body, fit, clip, t, part)
         for mine, theirs, (my_depth, true_depth) in zip(places, unseen.vertices, depths, strict=True):
-            goal = np.einsum("nk,nkc->nc", bary, theirs[body.faces[face]])
+            goal = np.einsum("nk,nkc->nc", bary, theirs[unseen.faces[face]])
             both = visible_points(goal, true_depth, true) & visible_points(mine[which], my_depth, own)
             miss = np.linalg.norm(own.project(mine[which[both]]) - true.project(goal[both]), axis=1)
             for number, name in enumerate(misses):
@@ -84,10 +96,10 @@ def correspond(body: Body, fit: BodyParams, clip: Scene, t: int, part: np.ndarra
     (n, 3) of their corners. part: (V,) of `parts_of_vertices`.
     """
     camera, mine = fit.camera(clip.camera.width, clip.camera.height), body.posed(fit, [t])[0][0]
-    face, bary, _ = rasterise(clip.vertices[t], body.faces, clip.camera)
+    face, bary, _ = rasterise(clip.vertices[t], clip.faces, clip.camera)
     which = np.flatnonzero(visible_points(mine, rasterise(mine, body.faces, camera)[2], camera))
     x, y = camera.project(mine[which]).astype(np.int64).T
-    same = (face[y, x] >= 0) & (part[body.faces[face[y, x], 0]] == part[which])
+    same = (face[y, x] >= 0) & (clip.part[clip.faces[face[y, x], 0]] == part[which])
     return which[same], face[y, x][same], bary[y, x][same]
 
 

@@ -12,14 +12,13 @@ from gsac.pipeline.errors import attach_summary, exit_code
 from gsac.pipeline.event_file import kept_events
 from gsac.pipeline.journal import Journal
 from gsac.pipeline.keys import Keys
-from gsac.pipeline.other_clip import find_other_clip, forget_results
+from gsac.pipeline.other_clip import forget_results, make_way
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.own_store import writable_store
 from gsac.pipeline.project import Project
 from gsac.pipeline.report.refresh import EarlySections, is_outdated, refresh_report
 from gsac.pipeline.run import ClipRun, Options
 from gsac.pipeline.run_folder import OWN_STORE, REPORT, RunFolder
-from gsac.stages.contract import BadInput
 
 MISTAKES = (ExitCode.USAGE, ExitCode.STALE)
 """Ends of a run that are the command line's or the clip's fault."""
@@ -46,12 +45,9 @@ class ClipWork:
         folder.say, self.journal.clip = self.journal.note, self.journal.clip or clip.name
         folder.refuse_foreign(clip, self.project)
         with folder.hold():
-            other = find_other_clip(folder, clip, self.store)
-            if other is not None and not self.replace:
-                raise BadInput(f"{folder.root} holds the avatar of {other}; give another --out, or --replace to put this "
-                               "clip's there")
+            replaced = make_way(folder, clip, self.store, self.replace)
             folder.prepare(clip, self.project, self.configs)
-            if other is not None:
+            if replaced:
                 forget_results(folder)
             store = writable_store(self.store, folder.root / OWN_STORE, self.journal)
             clip_run = ClipRun(self.project, self.configs, store, folder, self.journal, keys if store is self.store else None)

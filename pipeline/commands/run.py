@@ -22,6 +22,7 @@ from gsac.pipeline.commands.options import (
     values_of_person,
 )
 from gsac.pipeline.json_output import emit
+from gsac.pipeline.other_clip import make_way
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import STANDARD, find_quality, name_of, quality_entry, resolve_quality
@@ -68,6 +69,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         clip_run.keys.check(clip_run.select(options))
         if arguments.dry_run:
             run_folder.refuse_foreign(clip, project)
+            make_way(run_folder, clip, store, arguments.replace)
             return dry_run(clip_run, clip, options, reporter, arguments.json)
         finished = ClipWork(project, configs, store, options, journal, arguments.replace).do(clip, run_folder)
         for line in closing_lines(run_folder):

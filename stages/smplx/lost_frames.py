@@ -53,8 +53,8 @@ def refuse_lost(lost: dict[str, np.ndarray]) -> None:
     """Raises BadInput where no frame is left. lost: reason -> frames (T,) bool."""
     if np.any(list(lost.values()), axis=0).all():
         told = "; ".join(f"{reason} in {mask.sum()}" for reason, mask in lost.items() if mask.any())
-        raise BadInput(f"The body fits none of the clip's {counted(len(lost[REPEATED]), 'frame')}: {told}; film one whole person from "
-                       "head to feet, upright, and look whether masks, points or poses that you bring are this clip's")
+        raise BadInput(f"The body fits none of the clip's {counted(len(lost[REPEATED]), 'frame')}: {told}; film one whole "
+                       "person from head to feet, upright, and look whether masks, points or poses that you bring are this clip's")
 
 
 def is_mostly_loose(iou: np.ndarray) -> bool:

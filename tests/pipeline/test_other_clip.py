@@ -23,6 +23,14 @@ def test_another_clips_avatar_is_not_replaced_and_the_clip_that_is_there_is_name
     assert toy.gsac("status", toy.out).code == 0
 
 
+def test_a_dry_run_refuses_what_the_run_would_refuse_and_plans_what_it_would_replace(toy, other):
+    toy.ran()
+    done = toy.gsac("run", other, "--out", toy.out, "--dry-run")
+    assert done.code == 2 and f"{toy.out} holds the avatar of {toy.clip}; give another --out, or --replace" in done.err
+    assert toy.gsac("run", other, "--out", toy.out, "--dry-run", "--replace").code == 0
+    assert toy.result == "ALPHA ALPHA" and (toy.out / "clip").resolve() == toy.clip
+
+
 def test_phone_clips_of_one_name_do_not_take_each_others_folder(toy):
     for name, words in (("pa", "alpha beta"), ("pb", "gamma delta")):
         (toy.root / name).mkdir()
