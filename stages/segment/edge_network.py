@@ -1,6 +1,6 @@
 """Alpha near the outline by a small network, which sees the frame, the empty scene, the outline and the rough region.
 
-A U-Net of 0.27 million weights, trained on rendered people of whom no figure in docs/lab is one (`tools/edge_network.py`).
+A U-Net of 0.27 million weights, trained on rendered people of whom no figure in docs/lab is one (`tools/edge_network/`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from onnxruntime import InferenceSession
 
 NETWORK = Path(__file__).with_name("edge_network.onnx")
-"""Written by `tools/edge_network.py`."""
+"""Written by `tools/edge_network/`."""
 STEP = 16
 """The network halves its picture four times, so both sides are multiples of this."""
 AROUND = 24
