@@ -81,12 +81,15 @@ def test_a_run_stops_where_nothing_can_come_of_the_clip_and_goes_on_anyway(toy):
 
 @pytest.mark.slow
 @pytest.mark.footage
-@pytest.mark.parametrize(("clip", "code", "words"), [("truth-a/clip.mp4", 0, []), ("squats/pose_squats.mp4", 1, ["part_of_turn"])])
-def test_check_finds_nothing_wrong_with_a_turn_and_names_what_a_clip_lacks(tmp_path, clip, code, words):
+@pytest.mark.parametrize(("clip", "code", "words", "unsure"), [
+    ("truth-a/clip.mp4", 0, [], set()),
+    ("squats/pose_squats.mp4", 1, ["part_of_turn"], {"arm_doubtful"}),  # her left hand is lost for 3 s: hidden, or its arm in doubt
+])
+def test_check_finds_nothing_wrong_with_a_turn_and_names_what_a_clip_lacks(tmp_path, clip, code, words, unsure):
     if not (FOOTAGE / clip).exists():
         pytest.skip(f"footage {clip} is not here")
     done = subprocess.run([sys.executable, "-m", "gsac.pipeline.cli", "check", FOOTAGE / clip, "--json"], cwd=tmp_path,
                           capture_output=True, text=True, env=os.environ)
     said = json.loads(done.stdout.splitlines()[-1])
-    assert done.returncode == code and [finding["code"] for finding in said["findings"]] == words
+    assert done.returncode == code and [each for finding in said["findings"] if (each := finding["code"]) not in unsure] == words
     assert not list(tmp_path.iterdir())
