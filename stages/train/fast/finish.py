@@ -21,4 +21,4 @@ class Finish:
 
     def __call__(self, gaussians: Gaussians) -> Gaussians:
         """The gaussians, of the poses as they were, as they are handed out."""
-        return joint_strays.shrink_strays(joint_faces.hold_at_joints(self.drift.undo(gaussians), self.carried), self.seen)
+        return joint_strays.draw_in_strays(joint_faces.hold_at_joints(self.drift.undo(gaussians), self.carried), self.seen)

@@ -1,7 +1,8 @@
-"""Gaussians that still leave the body where a joint bends, bound to whatever face: shrunk until they no longer show off it.
+"""Gaussians that still leave the body where a joint bends, bound to whatever face: drawn in until they no longer show off it.
 
-The face of an armpit, an elbow or a knee grows as the joint bends, and what it carries grows with it. A handful of gaussians makes
-most of the fringe: few enough that the clip's own frames do not miss what they lose.
+The face of an armpit, an elbow or a knee grows as the joint bends, and with it grows what it carries: the size of a gaussian, and
+how high it stands over the face. So what stands above the surface around is lowered to it, and shrinks only if it still shows. A
+handful of gaussians makes most of the fringe: few enough that the clip's own frames do not miss what they lose.
 """
 
 from __future__ import annotations
@@ -21,19 +22,22 @@ from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.gaussians.joint_faces import BENDS
+from gsac.stages.train.gaussians.unseen import find_heights
 from gsac.stages.train.judge.novel_poses import turn_before_camera
 from gsac.stages.train.poses.poses import Poses
 
 TURNS = 3
 """Sides that each pose is looked at from."""
-OFF = 0.022
+OFF = 0.012
 """m off the body from which alpha of `FULL_SIZE` gaussians begins to count (fewer are wider); from twice as far all does."""
 LEAST = 2e-5
 """Stray alpha of a gaussian in a bent pose, over the silhouettes' area, that is too much."""
 GROWN = 0.005
 """m farther from the body than in the clip's usual pose that a gaussian has to reach there: hair, shoes and wide clothes stay."""
-ROUNDS, SHRUNK = 4, 0.75
-"""Rounds that shrink what strays, and the factor of one on its standard deviations."""
+HIGH = 0.001
+"""m above the surface around, in the usual pose, from which on a stray is lowered; one that lies on it shrinks."""
+ROUNDS, LOWERED, SHRUNK = 8, 0.7, 0.85
+"""Rounds, at most; the share of its height over the surface that one takes, and the factor of one on standard deviations."""
 
 
 class Side(NamedTuple):
@@ -80,10 +84,11 @@ def bend(poses: Poses, frames: np.ndarray) -> Bending:
     return Bending(faces, place(put_in_pose(poses, int(frames[0]), pose), faces), bent)
 
 
-def shrink_strays(gaussians: Gaussians, bending: Bending) -> Gaussians:
-    """The gaussians, some smaller."""
+def draw_in_strays(gaussians: Gaussians, bending: Bending) -> Gaussians:
+    """The gaussians, some lower or smaller."""
     faces, usual, left = bending
     out = gaussians[np.arange(len(gaussians))]
+    size, surface = np.maximum(usual.frames.k[gaussians.face], 1e-9), find_heights(gaussians, usual.frames)[1]
 
     def find_large(item: tuple[Bent, np.ndarray], _: Workspace) -> np.ndarray:
         posed, stray = item
@@ -98,7 +103,11 @@ def shrink_strays(gaussians: Gaussians, bending: Bending) -> Gaussians:
         left = [posed for posed, large in zip(left, found, strict=True) if len(large)]
         if not left:
             break
-        out.log_scale[np.unique(np.concatenate(found))] += np.float32(np.log(SHRUNK))
+        stray = np.unique(np.concatenate(found))
+        above = size[stray] * out.mu[stray, 1] - surface[stray]
+        high = above > HIGH
+        out.mu[stray[high], 1] -= LOWERED * above[high] / size[stray[high]]
+        out.log_scale[stray[~high]] += np.float32(np.log(SHRUNK))
     return out
 
 

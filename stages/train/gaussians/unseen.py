@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.binding import Bound, bind, face_frames
+from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.avatar.light import shade
@@ -103,13 +103,17 @@ def level_heights(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> 
     """
     step = STEP * max(1, SPARSE / max(len(gaussians), 1)) ** 0.5
     frames = face_frames(rest, faces)
-    size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
-    near = find_nearest(middle, middle, AROUND)
-    height = size * gaussians.mu[:, 1]
-    usual = np.median(height[near], axis=1)
+    size = np.maximum(frames.k[gaussians.face], 1e-9)
+    height, usual = find_heights(gaussians, frames)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     axes = np.einsum("ni,nij->nj", frames.R[gaussians.face, :, 1], bound.rotations) * bound.scales
     out = gaussians[np.arange(len(gaussians))]
     out.mu[:, 1] = np.clip(height, usual - step, usual + step) / size
     out.log_scale += np.minimum(0, np.log(step / np.maximum(np.linalg.norm(axes, axis=1), 1e-9)))[:, None].astype(np.float32)
     return out
+
+
+def find_heights(gaussians: Gaussians, frames: FaceFrames) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) m over the face that carries each gaussian, and (N,) the median of `AROUND` gaussians there. frames: of all faces."""
+    middle, height = frames.T[gaussians.face], frames.k[gaussians.face] * gaussians.mu[:, 1]
+    return height, np.median(height[find_nearest(middle, middle, AROUND)], axis=1)
