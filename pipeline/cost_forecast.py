@@ -96,8 +96,10 @@ class Forecast:
         parts = [f"{name} {duration(time.seconds)}" for name, time in self.stages.items() if time.seconds >= BRIEF_S]
         missing = f", without {' and '.join(self.unknown)}, of which no time is known" if self.unknown else ""
         cores = counted(self.cores, "core")
-        busy = ", longer while others keep it as busy as now" if self.load > self.cores else ""
-        return f"{lead} {duration(self.whole.seconds)} {where} ({cores}){busy}: {', '.join(parts)}{missing}; quality {quality}"
+        more = ", longer while others keep it as busy as now" if self.load > self.cores else ""
+        if not self.known_here:
+            more += ", half a minute more the first time, while kernels compile"
+        return f"{lead} {duration(self.whole.seconds)} {where} ({cores}){more}: {', '.join(parts)}{missing}; quality {quality}"
 
     def to_json(self) -> dict[str, Any]:
         """As --json holds it."""

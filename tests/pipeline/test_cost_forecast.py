@@ -165,8 +165,9 @@ def test_a_run_whose_frames_are_gone_from_the_store_does_not_count(tmp_path):
 def test_the_sentence_names_what_takes_time():
     assert FORECAST.sentence("standard") == "About 39 s on this machine (2 cores): split 2 s, train 37 s; quality standard"
     guessed = replace(FORECAST, unknown=("smplx",), cores=1, known_here=False, exact=False)
-    assert guessed.sentence("draft") == ("At most about 39 s on a machine like the one that was measured (1 core): split 2 s, "
-                                         "train 37 s, without smplx, of which no time is known; quality draft")
+    assert guessed.sentence("draft") == ("At most about 39 s on a machine like the one that was measured (1 core), half a minute "
+                                         "more the first time, while kernels compile: split 2 s, train 37 s, without smplx, of "
+                                         "which no time is known; quality draft")
 
 
 def test_a_busy_machine_is_said_to_be_busy():
