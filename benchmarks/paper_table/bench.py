@@ -20,8 +20,8 @@ GIVEN = "poses given"
 FILLS = {GIVEN: (), "detections as they are": ("handgap.method=none",),
          "paper's fill": ("handgap.method=paper", "handgap.rule=paper"), "our fill": ()}
 """Row -> settings of the run up to the body fit."""
-HIDDEN = ("right_back", "left_front")
-"""The turntable's `hidden_hand` of the clips, alternately."""
+HIDDEN = ("left_front", "right_back")
+"""The turntable's `hidden_hand` of even and of odd seeds, so that a part that runs on its own (`--beside`) has the same clips."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -50,8 +50,8 @@ def main(argv: list[str] | None = None) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     beside = [table.read_csv(path) for path in options.beside]
     rows: table.Rows = {}
-    for at, seed in enumerate(options.seeds):
-        hidden = HIDDEN[at % len(HIDDEN)]
+    for seed in options.seeds:
+        hidden = HIDDEN[seed % len(HIDDEN)]
         clip = render_clip(training.clip_folder(options.out, f"seed{seed}_{hidden}_{options.frames}"), say, seed=seed,
                            frames=options.frames, hidden_hand=hidden)
         for fill in options.fills:
