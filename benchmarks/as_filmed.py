@@ -19,14 +19,12 @@ from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import WHITE, composite, find_edge, squared_error, summary
 from gsac.avatar.threads import Workspace, side_by_side
+from gsac.benchmarks.moved_poses import move_onto
 from gsac.benchmarks.speed_accuracy.novel_poses import read_view
 from gsac.stages.train.judge.heldout import judge, render_view, truth
-from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View, read_whole
 
-ROUNDS = 12
-"""Rounds of Gauss-Newton that move a pose onto its frame."""
 FIGURES = ("psnr_fg", "psnr_face", "flip", "ssim_black", "detail")
 
 
@@ -57,7 +55,7 @@ def judge_as_filmed(run: Path, trained: Path, masks: Path | None = None) -> dict
         views = {t: read_view(paths[t], masks / paths[t].name, fit) for t in held}
     gaussians, poses = Gaussians.read(trained / "avatar.npz"), Poses(Body.load(), BodyParams.read(trained / "body.npz"))
     moved = poses.copy()
-    converge(gaussians, moved, held, views, ROUNDS)
+    move_onto(gaussians, moved, held, views)
     return {f"{name}{ending}": value for ending, own in (("", poses), ("_moved", moved))
             for name, value in _judge(gaussians, own, views).items()}
 

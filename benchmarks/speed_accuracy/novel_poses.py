@@ -17,14 +17,12 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, J
 from gsac.avatar.metrics import summary
 from gsac.avatar.threads import Workspace, side_by_side
+from gsac.benchmarks.moved_poses import move_onto
 from gsac.stages.train.judge.heldout import judge, render_view
 from gsac.stages.train.judge.novel_poses import disc
-from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
-ALIGN_ROUNDS = 16
-"""Rounds of Gauss-Newton: novel poses are further off than held-out ones, and 40 steps of Adam would end half-way."""
 RIM = 1 / 240
 """Share of the picture's height about the silhouette's edge where alpha may differ from the truth's."""
 
@@ -37,7 +35,7 @@ def read_true_params(truth: Path, model: str) -> BodyParams:
 
 
 def judge_poses(trained: Path, clip: Path, folder: Path, height: int | None = None, name: str = "novel") -> dict[str, float | None]:
-    """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first aligned to its image;
+    """`psnr_novel`, `ssim_novel`, `flip_novel`, `detail_novel`, and the same with `_aligned`: each pose first moved onto its image;
     also `stray_novel` and `holes_novel`, aligned, of `judge_outline`.
 
     trained: output folder of `train`; clip: a turntable's folder of novel poses; folder: for truth, render and error images;
@@ -50,7 +48,7 @@ def judge_poses(trained: Path, clip: Path, folder: Path, height: int | None = No
     poses, frames = Poses(body, params), range(params.frames)
     folder.mkdir(parents=True, exist_ok=True)
     found = rename_metrics(summary(judge(gaussians, poses, frames, views, folder, flip=True)), name)
-    converge(gaussians, poses, frames, views, ALIGN_ROUNDS)
+    move_onto(gaussians, poses, frames, views)
     found |= rename_metrics(summary(judge(gaussians, poses, frames, views, flip=True)), f"{name}_aligned")
     return found | {f"{what}_{name}": value for what, value in judge_outline(gaussians, poses, views).items()}
 

@@ -34,9 +34,10 @@ def init_gaussians(task: Task, coarse: dict[int, View], count: int) -> Gaussians
               for t in task.trained[::every]]
     gaussians = Gaussians.area(rest, faces, count, task.config.seed, density=find_detail(frames, rest, faces, task.config.seed))
     sights = read_sights(frames, faces, gaussians)
-    gaussians.light = find_light(sights, count) if task.config.light else None
+    places = centres_at_rest(gaussians, rest, faces)
+    gaussians.light = find_light(sights, places) if task.config.light else None
     rgb, seen = mean_colours(sights, count, gaussians.light)
-    gaussians.rgb = fill_unseen(rgb, seen, centres_at_rest(gaussians, rest, faces))
+    gaussians.rgb = fill_unseen(rgb, seen, places)
     if offset.any():
         gaussians, task.poses.offset = fold(gaussians, plain, offset, faces), np.zeros_like(offset)
     return gaussians

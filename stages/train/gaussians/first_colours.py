@@ -16,6 +16,7 @@ from gsac.avatar.light import FROM_CAMERA, basis, shade
 from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
+from gsac.stages.train.gaussians.light_from_above import find_from_above
 from gsac.stages.train.gaussians.nearest import find_nearest
 
 TOLD = 10.0
@@ -23,7 +24,7 @@ TOLD = 10.0
 NOISE = 0.1
 """Sigma of an observed colour, in 0..1."""
 EVEN = 0.3
-"""Sigma of the prior on the light's directed part."""
+"""Sigma of the prior on the light's directed part: as `find_from_above` has it, and even all round."""
 ROUNDS = 12
 """Of colours and light in turns."""
 LEAST_FACING = 0.1
@@ -122,28 +123,39 @@ def _weigh_light(which, colour, weight, rgb, square, product):
         square[i], product[i] = weight[i] * (own / 3), weight[i] * (seen / 3)
 
 
-def find_light(sights: list[Sight], count: int) -> np.ndarray:
-    """(4, 3) float32: the white light that explains the sights of `count` gaussians, each of one colour, best.
+def find_light(sights: list[Sight], places: np.ndarray) -> np.ndarray:
+    """(4, 3) float32: the white light that explains the sights of gaussians at places (N, 3) m at rest, each of one colour, best.
 
-    Solves for colours and light in turns, each by least squares. The light's strength cannot be separated from the brightness of
-    the colours, so its mean over the sights is set to 1. Without a turn of the person the prior keeps the light even. Coloured
-    lamps are not modelled: in a partial turn they absorb stains, and whole turns look as good without.
+    Solves for colours and light in turns, each by least squares, from a light that comes from above as far as the colours say so.
+    The light's strength cannot be separated from the brightness of the colours, so its mean over the sights is set to 1. Without a
+    turn of the person the prior keeps the light even all round. Coloured lamps are not modelled: in a partial turn they absorb
+    stains, and whole turns look as good without.
     """
     light = np.concatenate([np.ones((1, 3)), np.zeros((3, 3))])
-    every = _concatenate(sights)
+    every, count = _concatenate(sights), len(places)
     seen = float(every.weight.sum())
     if not seen:
         return light.astype(np.float32)
+    usual = np.array([0, 0, _from_above(every, places), 0])
+    light += usual[:, None]
     trust, terms = TOLD * len(sights) / NOISE**2 / seen, basis(every.normal).astype(np.float64)
     square, product = np.empty((2, len(every.which)))
     for _ in range(ROUNDS):
         rgb, _ = _mean_colours(every, count, shade(light, every.normal))
         _weigh_light(every.which, every.colour, every.weight, rgb, square, product)
         prior = np.diag([0, 1, 1, 1]) / EVEN**2
-        white = np.linalg.solve(trust * (terms.T @ (terms * square[:, None])) + prior, trust * (terms.T @ product))
+        white = np.linalg.solve(trust * (terms.T @ (terms * square[:, None])) + prior, trust * (terms.T @ product) + prior @ usual)
         mean = float(every.weight @ (terms @ white))
         light = np.tile((white * seen / mean)[:, None], 3)
     return light.astype(np.float32)
+
+
+def _from_above(sight: Sight, places: np.ndarray) -> float:
+    """`find_from_above` of the gaussians' mean colours and normals. places: (N, 3) m at rest."""
+    rgb, seen = _mean_colours(sight, len(places), np.ones_like(sight.colour))
+    weight = np.bincount(sight.which, sight.weight, len(places))
+    up = np.bincount(sight.which, sight.weight * sight.normal[:, 1], len(places)) / np.maximum(weight, 1e-12)
+    return find_from_above(rgb[seen], up[seen], places[seen])
 
 
 def fill_unseen(rgb: np.ndarray, seen: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ LAMP = np.tile([[0.8], [0.3], [0.1], [0.2]], 3)
 
 
 def turning(frames, span, noise=0.02, seed=0, count=400):
-    """What a camera at +z sees of points on a ball that turns by `span` rad under LAMP."""
+    """What a camera at +z sees of points on a ball that turns by `span` rad under LAMP, their colours and places."""
     random = np.random.default_rng(seed)
     rgb = random.uniform(0.1, 0.7, (count, 3))
     normals = random.normal(size=(count, 3))
@@ -23,7 +23,7 @@ def turning(frames, span, noise=0.02, seed=0, count=400):
         which = np.flatnonzero(n[:, 2] > 0.1)
         colour = rgb[which] * shade(LAMP, n[which]) + random.normal(0, noise, (len(which), 3))
         sights.append(Sight(which, colour, n[which], n[which, 2] ** 2))
-    return sights, rgb
+    return sights, rgb, 0.2 * normals
 
 
 def scaled(light, sights):
@@ -33,16 +33,17 @@ def scaled(light, sights):
 
 
 def test_the_light_of_a_turn_is_found():
-    """But for its part from above, of which a person who stays upright says nothing."""
-    sights, _ = turning(24, 2 * np.pi)
-    off = np.abs(find_light(sights, 400) - scaled(LAMP, sights))
+    """But its part from above less well, of which a person who stays upright says nothing, but colours do."""
+    sights, _, places = turning(24, 2 * np.pi)
+    off = np.abs(find_light(sights, places) - scaled(LAMP, sights))
     assert off[[0, 1, 3]].max() < 0.04
+    assert off[2].max() < 0.1
 
 
 def test_with_the_light_told_apart_the_colours_are_nearer_to_the_surfaces_own():
-    sights, rgb = turning(24, 2 * np.pi)
+    sights, rgb, places = turning(24, 2 * np.pi)
     even, seen = mean_colours(sights, 400)
-    told, _ = mean_colours(sights, 400, find_light(sights, 400))
+    told, _ = mean_colours(sights, 400, find_light(sights, places))
 
     def spread(colours):
         """How unevenly the found colours follow the true ones."""
@@ -50,13 +51,15 @@ def test_with_the_light_told_apart_the_colours_are_nearer_to_the_surfaces_own():
     assert spread(told) < 0.8 * spread(even)
 
 
-def test_without_a_turn_the_light_stays_even():
-    sights, _ = turning(10, 0.0)
-    assert np.abs(find_light(sights, 400)[1:]).max() < 0.02
+def test_without_a_turn_the_light_is_even_all_round_and_comes_from_above():
+    sights, _, places = turning(10, 0.0)
+    light = find_light(sights, places)
+    assert np.abs(light[[1, 3]]).max() < 0.02
+    assert 0 < light[2].min() < 0.3
 
 
 def test_nothing_seen_gives_an_even_light():
-    assert np.array_equal(find_light([], 5), [[1, 1, 1], [0, 0, 0], [0, 0, 0], [0, 0, 0]])
+    assert np.array_equal(find_light([], np.zeros((5, 3))), [[1, 1, 1], [0, 0, 0], [0, 0, 0], [0, 0, 0]])
 
 
 @pytest.mark.slow
