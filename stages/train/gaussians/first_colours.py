@@ -136,15 +136,16 @@ def find_light(sights: list[Sight], places: np.ndarray) -> np.ndarray:
     seen = float(every.weight.sum())
     if not seen:
         return light.astype(np.float32)
-    usual = np.array([0, 0, _from_above(every, places), 0])
-    light += usual[:, None]
+    expected = np.array([0, 0, _from_above(every, places), 0])
+    light += expected[:, None]
     trust, terms = TOLD * len(sights) / NOISE**2 / seen, basis(every.normal).astype(np.float64)
+    prior = np.diag([0, 1, 1, 1]) / EVEN**2
     square, product = np.empty((2, len(every.which)))
     for _ in range(ROUNDS):
         rgb, _ = _mean_colours(every, count, shade(light, every.normal))
         _weigh_light(every.which, every.colour, every.weight, rgb, square, product)
-        prior = np.diag([0, 1, 1, 1]) / EVEN**2
-        white = np.linalg.solve(trust * (terms.T @ (terms * square[:, None])) + prior, trust * (terms.T @ product) + prior @ usual)
+        white = np.linalg.solve(trust * (terms.T @ (terms * square[:, None])) + prior,
+                                trust * (terms.T @ product) + prior @ expected)
         mean = float(every.weight @ (terms @ white))
         light = np.tile((white * seen / mean)[:, None], 3)
     return light.astype(np.float32)
