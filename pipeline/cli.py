@@ -87,7 +87,11 @@ def _add_verbosity(parser: argparse.ArgumentParser, default: Any = argparse.SUPP
 
 
 class _Parser(argparse.ArgumentParser):
-    """Of the program and, by argparse's own way, of each command: what is wrong is one sentence."""
+    """Of the program and, by argparse's own way, of each command: what is wrong is one sentence, and an option is its whole name,
+    since the beginning of one may be that of two in the next version."""
+
+    def __init__(self, *given: Any, **named: Any):
+        super().__init__(*given, allow_abbrev=False, **named)
 
     def error(self, message: str) -> NoReturn:
         raise BadInput(f"{message}; `{self.prog} --help` tells what is taken")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from gsac.pipeline.commands.options import progress_reporter
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.run_folder import RUN
 from gsac.stages.contract import BadInput
@@ -29,6 +30,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"{page.parent}: no such folder; make it, or give another --out")
     from gsac.pipeline.report.compare import write_comparison
 
-    write_comparison(arguments.first, arguments.second, page)
+    with progress_reporter(arguments) as reporter:
+        reporter.note(f"draws the charts and pictures of {arguments.first} and {arguments.second} anew, which takes a few seconds")
+        write_comparison(arguments.first, arguments.second, page)
     print(page)
     return ExitCode.OK

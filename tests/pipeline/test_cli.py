@@ -83,6 +83,7 @@ def test_a_misspelt_word_is_answered_with_the_nearest_known_one(toy, arguments, 
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
+    (["run", "--unt", "train", "clip.mp4"], "unknown option --unt (did you mean --until?); `gsac run --help` lists them"),
     (["run", "--qualty", "draft", "clip.mp4"], "unknown option --qualty (did you mean --quality?); `gsac run --help` lists them"),
     (["run", "clip.mp4", "--hieght=1.7"], "unknown option --hieght (did you mean --height?)"),
     (["cache", "gc", "--dry-rnu"], "unknown option --dry-rnu (did you mean --dry-run?); `gsac cache gc --help`"),
