@@ -1,7 +1,7 @@
 """Poses moved onto their images by the avatar that is judged, from coarse images to the full ones, so that none ends half-way.
 
-At full size a sleeve's pattern has a best place at every stripe: from where a strong pose starts, Gauss-Newton then ends up to 5 dB
-below what the avatar can show (`docs/lab/training.md`, Joints that no frame shows bent), and what is compared is luck.
+At full size a sleeve's pattern has a best place at every stripe: from where a strong pose starts, Gauss-Newton then ends up to 4 dB
+below what the avatar can show (`docs/lab/training.md`, Moved from coarse to fine), and what is compared is luck.
 """
 
 from __future__ import annotations
