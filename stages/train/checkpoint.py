@@ -84,9 +84,9 @@ class HasState(Protocol):
         ...
 
 
-def loop_state(step: int, order: list[int], rng: np.random.Generator, trainer: HasState) -> State:
-    """The state of a training loop after `step` steps. order: frames still to come in this round."""
-    return {"step": step, "order": order, "rng": rng.bit_generator.state, "trainer": trainer.state()}
+def loop_state(step: int, order: list[int], rng: np.random.Generator, trainer: HasState, mean: HasState) -> State:
+    """The state of a training loop after `step` steps. order: frames still to come in this round; mean: of the last steps."""
+    return {"step": step, "order": order, "rng": rng.bit_generator.state, "trainer": trainer.state(), "mean": mean.state()}
 
 
 def _take_apart(value: Any, arrays: list[np.ndarray]) -> dict:

@@ -15,8 +15,9 @@ from gsac.stages.train.config import FAST_STEPS, coarse_share, coarse_steps
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
-from gsac.stages.train.fast.schedule import OFFSET_SHARE, correction_steps, person_pixels
+from gsac.stages.train.fast.schedule import OFFSET_SHARE, averaged_from, correction_steps, person_pixels
 from gsac.stages.train.fast.trainer import AT_ONCE, Step, Trainer
+from gsac.stages.train.gaussians.mean_of_steps import MeanOfSteps
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import Equations, FrameEquations, correct_midway
 from gsac.stages.train.poses.own_errors import correct_each, newton_steps
@@ -26,7 +27,7 @@ from gsac.stages.train.views import View, Views, of_each
 
 
 class Cpu(Backend):
-    """Every step by `Trainer.step`."""
+    """Every step by `Trainer.learn`."""
 
     device = "cpu"
 
@@ -42,13 +43,15 @@ class Cpu(Backend):
         steps = config.steps or FAST_STEPS[self.device]
         coarse_until = coarse_steps(person_pixels(task), steps)
         order: list[int] = []
+        mean = MeanOfSteps()
         if task.resumed is None:
             trainer, first = Trainer(init_gaussians(task, coarse, count), task), 0
         else:
             trainer, first = Trainer.from_state(task.resumed["trainer"], task), task.resumed["step"]
             order, rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
+            mean.restore(task.resumed["mean"])
             task.resumed = None
-        corrections = correction_steps(config, steps, self.device, AT_ONCE)
+        corrections, mean_from = correction_steps(config, steps, self.device, AT_ONCE), averaged_from(steps, self.device)
         for step in range(first, steps, AT_ONCE):
             if step in corrections:
                 self.correct(task, trainer, coarse if step < coarse_until else fine, together=step == corrections[0])
@@ -63,8 +66,11 @@ class Cpu(Backend):
             for done, loss in enumerate(trainer.learn(these), step + 1):
                 task.checkpoint(done, steps, loss, trainer.gaussians)
             done = step + len(these)
-            task.keep(done, steps, partial(loop_state, done, order, rng, trainer))
+            if done > mean_from:
+                mean.add(trainer.values)
+            task.keep(done, steps, partial(loop_state, done, order, rng, trainer, mean))
             task.progress(done, steps, "steps")
+        trainer.values = mean.values()
         if trainer.offsets:
             trainer.fold_offsets()
             trainer.lay_unseen(coarse)
@@ -78,9 +84,8 @@ class Cpu(Backend):
         trainer.config = refit_config(task.config, pace)
         order: list[int] = []
         steps = refit_steps(task.config, pace)
-        averaged = max(1, round(pace.averaged * steps / AT_ONCE))
+        averaged, mean = max(1, round(pace.averaged * steps / AT_ONCE)), MeanOfSteps()
         coarse_until = round(coarse_share(person_pixels(task)) * steps) if coarse else 0
-        sums = {name: np.zeros(value.shape) for name, value in trainer.values.items()}
         begins = range(0, steps, AT_ONCE)
         for begin in begins:
             these: list[Step] = []
@@ -91,10 +96,9 @@ class Cpu(Backend):
                 these.append(Step(t, shown[t], pace.begin + (1 - pace.begin) * number / steps, rng.random(3), number))
             trainer.learn(these)
             if begin in begins[-averaged:]:
-                for name, value in trainer.values.items():
-                    sums[name] += value
+                mean.add(trainer.values)
         trainer.free_buffers()
-        trainer.values = {name: (total / averaged).astype(np.float32) for name, total in sums.items()}
+        trainer.values = mean.values()
         return trainer
 
     def correct(self, task: Task, trainer: Trainer, views: dict[int, View], together: bool) -> None:

@@ -26,9 +26,10 @@ from gsac.stages.train.fast import schedule
 from gsac.stages.train.fast.backend import Backend, Round, Rounds, Trained
 from gsac.stages.train.fast.initial_gaussians import crop_views, init_gaussians
 from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
-from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.fast.trainer import Trainer, learned_values
 from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians import cloth_offsets
+from gsac.stages.train.gaussians.mean_of_steps import MeanOfSteps
 from gsac.stages.train.gpu import LPIPS_STEPS, hand_back, open_trainer, train_until
 from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.poses import bundle_adjust, own_errors
@@ -38,6 +39,8 @@ from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, 
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
 from gsac.stages.train.views import View, Views, of_each, person_crop
 
+MOMENTS = 10
+"""Steps at most, spread evenly over the last ones, whose gaussians are read to be averaged."""
 POSES_STAY = {"pose_rate": 0.0, "expression_rate": 0.0, "joint_rate": 0.0}
 
 SomeRecipe = TypeVar("SomeRecipe", bound=Recipe)
@@ -65,10 +68,10 @@ class Cuda(Backend):
             middle = Trainer(folded, task, frozen_body=True)
             middle.lay_unseen(coarse)
             trainer.replace(middle.gaussians(), ~middle.seen, middle.reach)
-            self.train_correcting(trainer, task, equations, recipe.steps)
+            mean = self.train_averaging(trainer, task, equations)
             hand_back(trainer, task)
             kept = take_over(trainer, task)
-            kept.seen = middle.seen
+            kept.values, kept.seen = mean.values(), middle.seen
             return Trained(kept, fine, coarse)
 
     def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,
@@ -120,6 +123,17 @@ class Cuda(Backend):
                 correct(poses, trained, trainer.gaussians, equations)
                 trainer.place(poses.pose[trained], poses.transl[trained])
         train_until(trainer, task, until)
+
+    def train_averaging(self, trainer: CudaTrainer, task: Task, equations: Equations) -> MeanOfSteps:
+        """`train_correcting` to the end. Returns the mean over the last steps; with a network in the loss, over those it is in."""
+        steps, mean = trainer.recipe.steps, MeanOfSteps()
+        begin = schedule.averaged_from(steps, self.device)
+        if task.network:
+            begin = max(begin, steps - LPIPS_STEPS)
+        for step in np.unique(np.linspace(begin + 1, steps, MOMENTS).round().astype(int)):
+            self.train_correcting(trainer, task, equations, int(step))
+            mean.add(learned_values(trainer.gaussians()))
+        return mean
 
     def align_poses(self, gaussians: Gaussians, poses: Poses, frames: np.ndarray, views: Views, steps: int) -> None:
         """As `Backend.align_poses`. frames: (n,)."""

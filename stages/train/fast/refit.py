@@ -14,7 +14,7 @@ class Pace(NamedTuple):
     begin: float
     """The rates are those of a training from this share of its steps on."""
     averaged: float
-    """Share of these steps, the last, whose gaussians are averaged: a single step has just followed the one frame that it saw."""
+    """Share of these steps, the last, whose gaussians are averaged on the CPU."""
     widened: float
     """Rate of the scales over a training's: merging leaves the scales farthest off."""
 

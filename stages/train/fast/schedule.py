@@ -17,6 +17,8 @@ OFFSET_RATE = 1e-3
 """m for each step of the surface's displacement; falls to a tenth."""
 GAIN_RATE = 2e-3
 """Step of a frame's gain; falls to a tenth."""
+AVERAGED = {"cpu": 0.1, "cuda": 0.2}
+"""Share of the steps, the last, whose gaussians are averaged, by device: of the CPU's fewer steps more are too old."""
 MU_END, END = 0.03, 0.3
 """What the rates of places, and of all else of a gaussian, fall to."""
 FINEST = 0.4
@@ -32,6 +34,11 @@ def correction_steps(config: TrainConfig, steps: int, device: str, multiple: int
     """
     shares = (MIDWAY, *LATE[device]) if config.pose_rounds else ()
     return [round(share * steps) // multiple * multiple for share in shares]
+
+
+def averaged_from(steps: int, device: str) -> int:
+    """The step, from 0, from which on the gaussians are averaged: at least the last one is. device: cpu or cuda."""
+    return min(round((1 - AVERAGED[device]) * steps), steps - 1)
 
 
 def budget(task: Task, device: str) -> int:

@@ -98,9 +98,7 @@ class Trainer:
         self.offsets = None if frozen_body else Offsets(task.poses.body)
         self.faces, self.face, self.light = task.poses.body.faces, gaussians.face, gaussians.light
         self.low_pass = gaussians.low_pass
-        self.values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale,
-                       "rgb": gaussians.rgb, "opacity_logit": opacity_logit(gaussians.opacity)[:, None]}
-        self.values = {name: np.array(value, np.float32, order="C") for name, value in self.values.items()}
+        self.values = learned_values(gaussians)
         self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)
@@ -229,8 +227,7 @@ class Trainer:
         """
         gaussians = self.freeze_unseen(views)
         gaussians = level_heights(flatten_unseen(gaussians, self.seen, self.rest, self.faces), self.rest, self.faces)
-        self.values |= {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
-                        "opacity_logit": opacity_logit(gaussians.opacity)[:, None].astype(np.float32)}
+        self.values = learned_values(gaussians)
         self.start = gaussians.mu.copy()
 
     def freeze_unseen(self, views: dict[int, View]) -> Gaussians:
@@ -309,6 +306,13 @@ class Trainer:
         limit(v["mu"][own], v["quat"][own], v["log_scale"][own], v["rgb"][own], v["opacity_logit"][own], self.start[own],
               self.face_scale[own], config.needle, self.least, self.largest, self.reach,
               config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
+
+
+def learned_values(gaussians: Gaussians) -> dict[str, np.ndarray]:
+    """A copy of what is learned of gaussians: name -> (N, ...) float32."""
+    values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
+              "opacity_logit": opacity_logit(gaussians.opacity)[:, None]}
+    return {name: np.array(value, np.float32, order="C") for name, value in values.items()}
 
 
 def opacity_logit(opacity: np.ndarray) -> np.ndarray:
