@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import shlex
-from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Executor
 from gsac.pipeline.run_folder import avatar_name
+from gsac.pipeline.text_lines import read_lines
 from gsac.stages.contract import BadInput
 from gsac.stages.split.film import MASKS, PHOTO_SUFFIXES, VIDEO_SUFFIXES, find_film
 
@@ -28,12 +28,12 @@ def find_clips(source: Path) -> list[Path]:
         raise BadInput(f"{source} is one video: `{shlex.join(['gsac', 'run', str(source)])}` makes its avatar; "
                        "give a folder of clips or a list of paths")
     try:
-        lines = source.read_text().splitlines()
+        lines = read_lines(source)
     except FileNotFoundError as e:
         raise BadInput(f"{source}: no such file or folder; give a folder of clips or a list of paths") from e
     except (OSError, UnicodeDecodeError) as e:
-        raise BadInput(f"{source}: not a list of clips ({e}); one path a line") from e
-    clips = [source.parent / line.strip() for line in lines if line.strip() and not line.strip().startswith("#")]
+        raise BadInput(f"{source}: not a list of clips ({e}); one path a line, in UTF-8") from e
+    clips = [source.parent / line for line in lines if not line.startswith("#")]
     if not clips:
         raise BadInput(f"{source}: the list is empty; one path a line")
     return clips
@@ -50,12 +50,20 @@ def is_clip(path: Path) -> bool:
 def make_jobs(clips: list[Path], out: Path, arguments: tuple[str, ...]) -> list[ClipJob]:
     """One folder a clip, `<out>/<clip>-avatar`; clips of equal name get a number. A clip named twice runs once."""
     clips = list(dict.fromkeys(path.absolute() for path in clips))
-    count: Counter[str] = Counter()
-    jobs = []
+    return [ClipJob(clip, out.absolute() / name, arguments) for clip, name in zip(clips, name_folders(clips), strict=True)]
+
+
+def name_folders(clips: list[Path]) -> list[str]:
+    """Name of each clip's folder, all different. The first clip of a name has it to itself; the others get the next free number."""
+    first = {avatar_name(clip): clip for clip in reversed(clips)}
+    taken, names = set(first), []
     for clip in clips:
-        count[avatar_name(clip)] += 1
-        jobs.append(ClipJob(clip, out.absolute() / avatar_name(clip, count[avatar_name(clip)]), arguments))
-    return jobs
+        name = avatar_name(clip)
+        if first[name] != clip:
+            name = next(free for number in itertools.count(2) if (free := avatar_name(clip, number)) not in taken)
+            taken.add(name)
+        names.append(name)
+    return names
 
 
 def run_batch(jobs: list[ClipJob], executor: Executor, on_result: Callable[[ClipResult], None],

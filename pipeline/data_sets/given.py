@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from gsac.pipeline import text_lines
 from gsac.stages.contract import BadInput
 from gsac.stages.split.photos import natural_order
 
@@ -107,10 +108,9 @@ def list_pictures(folder: Path) -> list[Path]:
 def read_lines(path: Path, what: str = "") -> list[str]:
     """The lines of a text file without the empty ones. what: it is, in words."""
     try:
-        lines = need_file(path, what).read_text(encoding="utf-8-sig").splitlines()
+        return text_lines.read_lines(need_file(path, what))
     except UnicodeDecodeError as e:
         raise BadInput(f"{path}: is no text in UTF-8 ({e.reason}); download it again, or save it as UTF-8") from e
-    return [line.strip() for line in lines if line.strip()]
 
 
 def read_names(path: Path, numbers: dict[str, int]) -> list[int]:

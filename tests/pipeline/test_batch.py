@@ -1,6 +1,8 @@
 import io
+import os
 import signal
 import subprocess
+import sys
 import threading
 import time
 
@@ -13,6 +15,7 @@ from gsac.pipeline.events import ClipEnded, StageProgress, StageStarted
 from gsac.pipeline.executors.executor import ClipJob, ClipResult, Limits
 from gsac.pipeline.executors.local import LocalExecutor
 from gsac.pipeline.reporter import TerminalReporter
+from gsac.stages.contract import BadInput
 
 pytestmark = pytest.mark.slow
 
@@ -118,6 +121,32 @@ def test_folders_of_photos_or_of_a_video_with_masks_are_clips_and_other_things_a
 def test_clips_of_equal_name_get_folders_of_their_own(tmp_path):
     jobs = make_jobs([tmp_path / "a" / "x.mp4", tmp_path / "b" / "x.mp4", tmp_path / "a" / "x.mp4"], tmp_path, ())
     assert [job.out.name for job in jobs] == ["x-avatar", "x-2-avatar"]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_number_of_an_equal_name_is_no_other_clips_name(tmp_path, order):
+    clips = [tmp_path / name for name in ("take.mov", "take.mp4", "take-2.mp4", "take.MOV", "take-2.mov")][::order]
+    jobs = make_jobs(clips, tmp_path, ())
+    assert {job.out.name for job in jobs} == {"take-avatar", *(f"take-{n}-avatar" for n in (2, 3, 4)), "take-2-2-avatar"}
+    own = next(job for job in jobs if job.clip.stem == "take-2")
+    assert own.out.name == "take-2-avatar" and len({job.name for job in jobs}) == len(clips)
+
+
+def test_a_list_is_read_without_the_mark_that_windows_writes_and_another_encoding_is_said(tmp_path):
+    todo = tmp_path / "todo.txt"
+    todo.write_text(" a.mp4\r\n\r\n# later\r\nb.mov\r\n", "utf-8-sig", newline="")
+    assert find_clips(todo) == [tmp_path / "a.mp4", tmp_path / "b.mov"]
+    todo.write_bytes("a.mp4".encode("utf-16"))
+    with pytest.raises(BadInput, match=r"todo.txt: not a list of clips .*in UTF-8"):
+        find_clips(todo)
+
+
+def test_a_list_is_read_as_utf8_in_any_locale(tmp_path):
+    (tmp_path / "todo.txt").write_text("Jörg.mp4\n", "utf-8")
+    ask = "from pathlib import Path; from gsac.pipeline.batch import find_clips; print(ascii(find_clips(Path('todo.txt'))))"
+    plain = os.environ | {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
+    done = subprocess.run([sys.executable, "-c", ask], cwd=tmp_path, env=plain, capture_output=True, text=True)
+    assert "J\\xf6rg.mp4" in done.stdout, done.stderr
 
 
 def test_a_folder_of_an_earlier_batch_with_another_clip_of_that_name_is_replaced_only_if_told(toy, clips):
