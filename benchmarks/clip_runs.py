@@ -37,7 +37,7 @@ def run_clip(folder: Path, out: Path, stages: Iterable[str], store: Store, say: 
     film = folder / "clip.mp4"
     project, clip, run = Project.at_hand(), (film if film.is_file() else folder).resolve(), RunFolder(out)
     configs = resolve(project, sets=settings)
-    run.prepare(clip, project, configs)
+    run.prepare(clip, project, configs, store)
     for last in stages:
         ClipRun(project, configs, store, run, say).run(clip, Options(until=last))
     return run

@@ -46,7 +46,7 @@ class ClipWork:
         folder.refuse_foreign(clip, self.project)
         with folder.hold():
             replaced = make_way(folder, clip, self.store, self.replace)
-            folder.prepare(clip, self.project, self.configs)
+            folder.prepare(clip, self.project, self.configs, self.store)
             if replaced:
                 forget_results(folder)
             store = writable_store(self.store, folder.root / OWN_STORE, self.journal)

@@ -29,7 +29,7 @@ from gsac.cache.roots import find_links, register
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.params import to_yaml
-from gsac.pipeline.placing import are_real, is_known, is_link_to, keep_aside, link, place, stands_in_the_way
+from gsac.pipeline.placing import are_real, content, is_known, is_link_to, keep_aside, link, place, stands_in_the_way
 from gsac.pipeline.project import Project, shipped_dag
 from gsac.stages.contract import BadInput
 from gsac.stages.split.film import find_photos
@@ -139,19 +139,30 @@ class RunFolder:
     def _waiting(self) -> None:
         self.say(f"another command works in {self.root}; this one waits for its end (Ctrl-C stops the wait)")
 
-    def prepare(self, clip: Path, project: Project, configs: dict[str, Any]) -> None:
-        """Makes it the folder of this clip and these parameters."""
+    def prepare(self, clip: Path, project: Project, configs: dict[str, Any], store: Store) -> None:
+        """Makes it the folder of this clip and these parameters. store: which files it has read already."""
         self.refuse_foreign(clip, project)
         self.root.mkdir(parents=True, exist_ok=True)
         self.write(DAG, project.dag.read_text())
         self.write(PARAMS, to_yaml(configs, notes=False))
         if (self.root / LOGS).is_symlink() or (self.root / LOGS).is_file():
             keep_aside(self.root / LOGS, self.say)
-        if self.clip.is_symlink() or not self.clip.exists():
-            if not self.clip.is_symlink() or os.readlink(self.clip) != str(clip):
-                link(clip, self.clip)
-        elif not self.clip.samefile(clip):
-            raise BadInput(f"{self.clip} is there and is not a link; move it away or choose another --out")
+        self._show_clip(clip, store)
+
+    def _show_clip(self, clip: Path, store: Store) -> None:
+        """Makes `clip` a link to the source clip; a copy where the file system has no links, which is noted and may be replaced."""
+        if self.clip.exists() and not self.clip.is_symlink():
+            found = content(self.clip, store)
+            if self.clip.samefile(clip) or (found is not None and found == content(clip.resolve(), store)):
+                return
+            if not is_known(found, self._placed().get(CLIP)):
+                raise BadInput(f"{self.clip} is there and is not this clip, nor a copy that gsac made; move it away or choose "
+                               "another --out")
+        link(clip, self.clip)
+        copied = None if self.clip.is_symlink() else content(self.clip, store)
+        after = {name: digests for name, digests in self._placed().items() if name != CLIP} | ({CLIP: copied} if copied else {})
+        if after != self._placed():
+            self._write_placed(after)
 
     def discard(self) -> None:
         """Removes the folder, where `prepare` has made it and it holds nothing but what a run writes, and those made above it."""

@@ -34,7 +34,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         run_folder = RunFolder(folder / clip.name)
         clip_run = ClipRun(project, configs, store, run_folder)
         with run_folder.hold():
-            run_folder.prepare(clip, project, configs)
+            run_folder.prepare(clip, project, configs, store)
             clip_run.keys.pull_models(clip_run.select(options), reporter.note)
             with contextlib.suppress(HopelessClipError):  # the finding says so
                 clip_run.run(clip, options)

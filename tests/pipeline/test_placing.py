@@ -1,5 +1,6 @@
 """What a run shows in its folder: links into the store, and in export/ files that are the user's own."""
 
+import functools
 import json
 import os
 import shutil
@@ -141,15 +142,50 @@ def test_a_copy_that_breaks_off_leaves_what_was_there_and_nothing_beside_it(shel
     assert shelf.holds == BOTH and {path.name for path in shelf.folder.iterdir()} == {"avatar.glb", "unity"}
 
 
-def test_a_folder_without_links_gets_copies_which_are_known_again(monkeypatch, shelf):
-    def no_links(self, target, target_is_directory=False):
+@pytest.fixture
+def no_links(monkeypatch):
+    """A file system that knows no links."""
+    def refuse(self, target, target_is_directory=False):
         raise OSError("no links here")
 
-    monkeypatch.setattr(placing.Path, "symlink_to", no_links)
+    monkeypatch.setattr(placing.Path, "symlink_to", refuse)
+
+
+def test_a_folder_without_links_gets_copies_which_are_known_again(no_links, shelf):
     shelf.place("one", "train")
     assert shelf.holds == BOTH and not (shelf.folder / "unity").is_symlink()
     shelf.place("two", "train")
     assert shelf.holds["avatar.glb"] == "two" and shelf.said == []
+
+
+@pytest.fixture
+def gsac(inside, toy):
+    """`gsac` in this process, its stages in theirs."""
+    return functools.partial(inside, toy, PYTHONPATH=toy.env["PYTHONPATH"])
+
+
+def test_a_clip_that_had_to_be_copied_is_taken_again_and_gives_way_to_another_one(no_links, gsac, toy):
+    words = ("run", toy.clip, "--out", toy.out)
+    assert gsac(*words).code == 0 and not (toy.out / "clip").is_symlink()
+    again = gsac(*words, "--json")
+    assert again.code == 0 and set(again.statuses.values()) == {"cached"}
+    other = toy.root / "other.mp4"
+    other.write_text("omega psi")
+    assert gsac("run", other, "--out", toy.out, "--replace").code == 0
+    assert (toy.out / "clip").read_text() == "omega psi" and toy.result == "OMEGA OMEGA"
+
+
+def test_a_users_own_file_in_the_place_of_the_clip_is_never_lost(no_links, gsac, toy):
+    words = ("run", toy.clip, "--out", toy.out)
+    gsac(*words)
+    (toy.out / "clip").write_text("precious")
+    refused = gsac(*words)
+    assert refused.code == 2 and "nor a copy that gsac made; move it away" in refused.err
+    assert (toy.out / "clip").read_text() == "precious"
+    toy.clip.write_text("precious")
+    assert gsac(*words, "--replace").code == 0, "the clip itself, by its content"
+    toy.clip.write_text("other words")
+    assert gsac(*words, "--replace").code == 2 and (toy.out / "clip").read_text() == "precious"
 
 
 @pytest.fixture
