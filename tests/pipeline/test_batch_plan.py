@@ -77,6 +77,15 @@ def test_resume_without_a_batch_and_resume_with_clips_are_refused(toy, clips, ou
     assert neither.code == 2 and "no FOLDER or LIST" in neither.err
 
 
+@pytest.mark.parametrize(("words", "option"), [
+    (("--set", "join.keep=5"), "--set"), (("--quality", "draft"), "--quality"), (("--until", "cut"), "--until"),
+    (("--from", "join"), "--from"), (("--force", "cut"), "--force"), (("--anyway",), "--anyway"), (("--replace",), "--replace"),
+    (("--height", "1.7"), "--height"), (("--body", "mine"), "--body"), (("--params", "params.yaml"), "--params")])
+def test_resume_refuses_what_it_would_take_from_the_batch_and_names_it(inside, toy, out, words, option):
+    refused = inside(toy, "batch", "--resume", "--out", out, *words)
+    assert refused.code == 2 and f"--resume takes {option} from" in refused.err and f"leave {option} out" in refused.err
+
+
 def test_changed_only_leaves_clips_whose_file_is_the_same_though_parameters_are_others(toy, clips, out):
     toy.gsac("batch", clips, "--out", out)
     (clips / "two.mp4").write_text("other words")
