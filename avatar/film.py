@@ -51,9 +51,11 @@ class Film:
 
 
 def turntable(avatar: RiggedAvatar, seconds: float, fps: float) -> Film:
-    """The A-pose, seen by a camera that goes around it once."""
+    """The A-pose, or the T-pose where the avatar has no A, as in the viewer, seen by a camera that goes around it once."""
     T = max(1, round(seconds * fps))
-    pose = np.tile(avatar.pose("A" if "A" in avatar.poses else next(iter(avatar.poses))), (T, 1, 1))
+    name = next((name for name in ("A", "T") if name in avatar.poses), None)
+    still = np.zeros((len(avatar.joints), 3), np.float32) if name is None else avatar.pose(name)  # no turns are the T-pose
+    pose = np.tile(still, (T, 1, 1))
     return Film(pose, np.zeros((T, 3), np.float32), np.arange(T) * 360.0 / T, fps)
 
 

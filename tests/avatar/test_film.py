@@ -41,6 +41,12 @@ def test_the_turn_begins_at_the_front_goes_all_round_and_the_left_hand_is_at_the
     assert columns(seen[1], 0) < columns(seen[0], 0), "the camera goes to our right, so the left hand comes to the middle"
 
 
+def test_an_avatar_without_poses_turns_in_t_pose_as_in_the_viewer(figure):
+    np.testing.assert_array_equal(turntable(replace(figure, poses={}), 0.2, 10).pose, np.zeros((2, len(figure.joints), 3)))
+    only_t = replace(figure, poses={"T": figure.poses["A"]})
+    np.testing.assert_array_equal(turntable(only_t, 0.1, 10).pose[0], figure.pose("A"))
+
+
 def test_the_shadow_lies_under_the_feet_and_nowhere_else(figure):
     film = turntable(figure, 0.1, 10)
     white = np.ones(3)
