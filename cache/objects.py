@@ -176,7 +176,7 @@ class _NoMemo(Memo):
     def __init__(self) -> None:
         self._pending, self._connection = [], None
 
-    def put(self, kind: str, stat: os.stat_result, value: str) -> None:
+    def put(self, kind: str, stat: os.stat_result, value: str, sealed: bool = False) -> None:
         pass
 
 

@@ -153,3 +153,10 @@ def test_every_file_and_folder_of_a_tree_reaches_the_disk_and_a_failure_is_raise
     monkeypatch.setattr(os, "fsync", fail)
     with pytest.raises(OSError, match="Input/output error"):
         objects.sync(tmp_path / "tree")
+
+
+def test_the_memo_that_remembers_nothing_takes_what_a_memo_takes(tmp_path):
+    (tmp_path / "file").write_text("a")
+    objects.NO_MEMO.put("file", (tmp_path / "file").stat(), "digest", sealed=True)
+    objects.NO_MEMO.flush()
+    assert objects.NO_MEMO.get("file", (tmp_path / "file").stat()) is None
