@@ -106,8 +106,12 @@ def test_a_disk_that_takes_no_more_ends_the_file_and_not_the_run(tmp_path, monke
         raise OSError(28, "No space left on device")
 
     with EventFile(tmp_path) as file:
-        monkeypatch.setattr(event_file.os, "write", full)
-        file.take(Note(message="lost"))
+        file.take(Note(message="kept"))
+        with monkeypatch.context() as patch:
+            patch.setattr(event_file.os, "write", full)
+            file.take(Note(message="lost"))
+        file.take(Note(message="too late: what came between would be missing unseen"))
+    assert [event.message for event in read_events(tmp_path)] == ["kept"]
     with EventFile(tmp_path / "not there") as file:
         file.take(Note(message="lost"))
 
