@@ -9,6 +9,7 @@ from typing import Any
 from gsac.pipeline.report.page import AVATAR, Section, headline, make_sections, make_template
 from gsac.pipeline.report.results import Results
 from gsac.pipeline.report.tables import format_value
+from gsac.pipeline.run_folder import write_text
 
 TEMPLATE = "compare.html.jinja"
 PICTURES = ("heldout", "views")
@@ -16,7 +17,7 @@ PICTURES = ("heldout", "views")
 
 
 def write_comparison(first: Path, second: Path, page: Path) -> None:
-    """Writes the page that compares two runs' folders."""
+    """Writes the page that compares two runs' folders, whole or not at all."""
     runs = [Results(first), Results(second)]
     drawn = [{section.ident: section for section in make_sections(results)} for results in runs]
     heads = [headline(results, facts_of(sections)) for results, sections in zip(runs, drawn, strict=True)]
@@ -25,7 +26,7 @@ def write_comparison(first: Path, second: Path, page: Path) -> None:
                                   avatars=[sections[AVATAR].sheet for sections in drawn],
                                   figures=pair_figures(*(head["figures"] for head in heads)),
                                   parameters=differing_parameters(*runs), pictures=pair_pictures(*drawn))
-    page.write_text(text, encoding="utf-8")
+    write_text(page, text)
 
 
 @functools.cache

@@ -1,7 +1,9 @@
 """report.html: whole, partial and failed runs; nothing outside the page; nothing of the user's text taken for HTML."""
 
 import base64
+import errno
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -697,5 +699,34 @@ def test_two_runs_stand_side_by_side_with_the_parameters_that_differ(whole, copi
     assert "turn.mp4" in page.text() and "<other>.mp4" in page.text() and "private" not in page.html
     assert page.text().count("~ Fair Face") == 2 and "26.54 dB 26.54 dB" in page.text()
     assert len(page.images("head")) == 2 * (1 + 2 + 1)
-    assert execute(["compare", str(whole), str(copied), "--out", str(out)]) == 2, "nothing is written over unasked"
-    assert execute(["compare", str(whole), str(tmp_path / "nowhere")]) == 2
+
+
+def test_compare_says_what_is_wrong_before_it_draws_and_writes_the_page_whole_or_not_at_all(whole, copied, tmp_path, capsys, monkeypatch):
+    def refused(*words):
+        assert execute(["compare", str(whole), *map(str, words)]) == 2
+        said = capsys.readouterr().err
+        assert "draws the charts" not in said
+        return said
+
+    out = tmp_path / "both.html"
+    out.write_text("mine")
+    assert f"{out} is there already; give another --out, or --force" in refused(copied, "--out", out)
+    assert "is a folder; give the name of a file" in refused(copied, "--out", tmp_path)
+    assert "expected a file in a folder that exists" in refused(copied, "--out", tmp_path / "no" / "both.html")
+    assert "nowhere: not the folder of a run" in refused(tmp_path / "nowhere")
+    monkeypatch.setattr(os, "replace", full_disk)
+    assert execute(["compare", str(whole), str(copied), "--out", str(out), "--force"]) != 0
+    assert out.read_text() == "mine" and [path.name for path in tmp_path.glob("*both*")] == ["both.html"]
+
+
+def full_disk(*_):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_compare_names_the_command_that_brings_back_what_a_cache_has_lost(whole, copied, tmp_path, capsys):
+    body = copied / "smplx" / "body.npz"
+    body.unlink()
+    body.symlink_to(tmp_path / "gone" / "objects" / "ab" / f"{'ab' * 32}.npz")
+    assert execute(["compare", str(whole), str(copied), "--out", str(tmp_path / "both.html")]) == 2
+    said = capsys.readouterr().err
+    assert "brings them back" in said and "gsac run" in said and not (tmp_path / "both.html").exists()
