@@ -23,14 +23,16 @@ FORMATS = {
     "glb": "gaussians in one pose, alone, with KHR_gaussian_splatting",
 }
 """Suffix -> what it is for."""
+POSED = ("sog", "glb")
+"""Of these, those whose gaussians stand still in one pose."""
 
 
 def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("avatar", type=Path, metavar="AVATAR", help="avatar.gsac, or the folder of a run or its export folder")
     command.add_argument("format", metavar="FORMAT",
                          help="; ".join(f"{name}: {words}" for name, words in FORMATS.items()))
-    command.add_argument("--pose", default="a", metavar="NAME",
-                         help="pose of the gaussians: a (arms half down) or t (arms out); default: a")
+    command.add_argument("--pose", metavar="NAME",
+                         help=f"pose of the gaussians in {' or '.join(POSED)}: a (arms half down) or t (arms out); default: a")
     command.add_argument("--out", type=Path, metavar="FILE", help="default: <avatar>.<FORMAT>, here")
     add_force(command)
     add_json(command)
@@ -40,8 +42,11 @@ def declare(command: argparse.ArgumentParser) -> None:
 def do(arguments: argparse.Namespace) -> ExitCode:
     if arguments.format not in FORMATS:
         raise BadInput(f"unknown format {arguments.format}{did_you_mean(arguments.format, FORMATS)}; known: {', '.join(FORMATS)}")
-    if arguments.pose not in get_args(Pose):
+    if arguments.pose not in (None, *get_args(Pose)):
         raise BadInput(f"--pose {arguments.pose}: expected {' or '.join(get_args(Pose))}")
+    if arguments.pose is not None and arguments.format not in POSED:
+        raise BadInput(f"--pose {arguments.pose}: {arguments.format} has no pose of its own, since it moves; leave it out, or choose "
+                       f"{' or '.join(POSED)}")
     file = find_avatar(arguments.avatar)
     out = (arguments.out or Path(f"{name_avatar(file)}.{arguments.format}")).absolute()
     if out.suffix.lower() != f".{arguments.format}" or not out.parent.is_dir():
@@ -60,15 +65,16 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def write(file: Path, kind: str, pose: Pose, out: Path) -> int:
-    """Writes the avatar `file` in a format, whole or not at all. Returns the number of bytes."""
+def write(file: Path, kind: str, pose: Pose | None, out: Path) -> int:
+    """Writes the avatar `file` in a format, whole or not at all. Returns the number of bytes. pose: of POSED, `a` if None."""
     from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.files import write_file
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
-    from gsac.stages.export.on_request import WRITERS
+    from gsac.stages.export.on_request import POSED_WRITERS, WRITERS
 
     try:
-        content = WRITERS[kind](RiggedAvatar.read(file), pose)
+        avatar = RiggedAvatar.read(file)
+        content = POSED_WRITERS[kind](avatar, pose or "a") if kind in POSED else WRITERS[kind](avatar)
     except ArtifactError as e:
         raise BadInput(str(e)) from e
     with half_made(out.parent) as (folder, _):

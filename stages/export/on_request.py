@@ -17,12 +17,12 @@ from gsac.stages.export.usdz import usdz_bytes
 from gsac.stages.export.vrm import vrm_bytes
 
 
-def vrm(avatar: RiggedAvatar, pose: Pose) -> bytes:
-    """A VRM file rests in T-pose, whatever pose is asked for."""
+def vrm(avatar: RiggedAvatar) -> bytes:
+    """A VRM file rests in T-pose."""
     return vrm_bytes(avatar, _paint(avatar))
 
 
-def usdz(avatar: RiggedAvatar, pose: Pose) -> bytes:
+def usdz(avatar: RiggedAvatar) -> bytes:
     """A USDZ file moves as the first clip does."""
     return usdz_bytes(avatar, _paint(avatar))
 
@@ -37,8 +37,10 @@ def glb(avatar: RiggedAvatar, pose: Pose) -> bytes:
     return splats_glb_bytes(avatar, *pose_gaussians(avatar, _find_pose(avatar, pose)))
 
 
-WRITERS: dict[str, Callable[[RiggedAvatar, Pose], bytes]] = {"vrm": vrm, "usdz": usdz, "sog": sog, "glb": glb}
-"""Format, which is the file's suffix -> its bytes."""
+WRITERS: dict[str, Callable[[RiggedAvatar], bytes]] = {"vrm": vrm, "usdz": usdz}
+"""Format that moves, which is the file's suffix -> its bytes."""
+POSED_WRITERS: dict[str, Callable[[RiggedAvatar, Pose], bytes]] = {"sog": sog, "glb": glb}
+"""Format that stands still in a pose -> its bytes."""
 
 
 def _paint(avatar: RiggedAvatar) -> Surface:

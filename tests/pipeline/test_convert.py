@@ -7,8 +7,8 @@ import pytest
 
 from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.pipeline.cli import execute
-from gsac.pipeline.commands.convert import FORMATS
-from gsac.stages.export.on_request import WRITERS
+from gsac.pipeline.commands.convert import FORMATS, POSED
+from gsac.stages.export.on_request import POSED_WRITERS, WRITERS
 from support.figure import make_figure
 
 
@@ -37,7 +37,13 @@ def test_an_avatar_becomes_a_file_of_each_format_named_after_its_run(run, tmp_pa
 
 
 def test_every_format_that_the_command_names_has_a_writer():
-    assert FORMATS.keys() == WRITERS.keys()
+    assert FORMATS.keys() == WRITERS.keys() | POSED_WRITERS.keys() and set(POSED) == POSED_WRITERS.keys()
+
+
+@pytest.mark.parametrize("kind", ["vrm", "usdz"])
+def test_a_pose_of_a_format_that_moves_is_refused(run, tmp_path, capsys, kind):
+    code, _, said = convert(capsys, run, kind, "--pose", "t", "--out", tmp_path / f"a.{kind}")
+    assert code == 2 and f"--pose t: {kind} has no pose of its own" in said and not list(tmp_path.iterdir())
 
 
 def test_gaussians_stand_in_the_pose_that_is_asked_for(run, tmp_path, capsys):
