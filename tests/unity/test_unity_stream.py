@@ -70,10 +70,12 @@ def damaged(raw, count, seed):
 
 
 def test_a_pose_stream_is_taken_from_the_network_and_smoothed(play, files):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    lines = play("stream", files / "figure.gsac", port).splitlines()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as two:
+        for probe in (one, two):
+            probe.bind(("127.0.0.1", 0))
+        ports = [probe.getsockname()[1] for probe in (one, two)]
+    *lines, moved = play("stream", files / "figure.gsac", *ports).splitlines()
+    assert moved == "moved 1", "a port that is set while the stream is enabled is listened to, the old one no more"
     assert lines[0] == "Messages taken = 2, Refused: Kind = 1, Refused: Truncated = 1"
     degrees, weight = np.array([line.split() for line in lines[1:]], float).T
     assert 5 < degrees[0] < 40 and (np.diff(degrees) > 0).all(), "softly"

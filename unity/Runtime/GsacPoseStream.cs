@@ -36,6 +36,7 @@ namespace Gsac
         GsacLivePose shown;
         Socket socket;
         Thread thread;
+        bool wanted; // between OnEnable and OnDisable, whether or not the port could be opened
         volatile bool listening;
 
         /// <summary>Messages taken, and datagrams that were none.</summary>
@@ -45,6 +46,7 @@ namespace Gsac
         /// <summary>Why the last one was refused; None where all were taken.</summary>
         public GsacMessageFault LastFault { get; private set; }
 
+        /// <summary>Datagrams that were refused for this fault.</summary>
         public int RefusedFor(GsacMessageFault fault)
         {
             return refused[(int)fault];
@@ -57,22 +59,37 @@ namespace Gsac
             set { parts = value; }
         }
 
+        /// <summary>s: time constant of the smoothing; 0 for none.</summary>
         public float Smoothing
         {
             get { return smoothing; }
             set { smoothing = value; }
         }
 
+        /// <summary>The UDP port that is listened to. Another one is listened to at once where the stream is enabled.</summary>
         public int Port
         {
             get { return port; }
-            set { port = value; }
+            set
+            {
+                if (port == value) return;
+                port = value;
+                if (!wanted) return;
+                Close();
+                Open();
+            }
         }
 
         void OnEnable()
         {
             avatar = GetComponent<GsacAvatar>();
             if (avatar.IsOpen) Prepare();
+            wanted = true;
+            Open();
+        }
+
+        void Open()
+        {
             socket = new Socket(AddressFamily.InterNetwork, SocketType.Dgram, ProtocolType.Udp);
             try
             {
@@ -101,6 +118,12 @@ namespace Gsac
         }
 
         void OnDisable()
+        {
+            wanted = false;
+            Close();
+        }
+
+        void Close()
         {
             listening = false;
             if (socket == null) return;

@@ -22,7 +22,7 @@ public static class Play
             case "pose": Pose(args[1], args[2], args[3]); break;
             case "allocations": Allocations.Print(typeof(GsacAvatar).Assembly, args); break;
             case "garbage": Garbage(args[1]); break;
-            case "stream": Stream(args[1], int.Parse(args[2])); break;
+            case "stream": Stream(args[1], int.Parse(args[2]), int.Parse(args[3])); break;
             case "messages": Messages(args[1], args[2], args[3]); break;
             case "benchmark": Benchmark(args[1], args[2]); break;
             case "import": Import(args[1]); break;
@@ -375,7 +375,7 @@ public static class Play
     }
 
     /// <summary>Datagrams through the real socket: how far the elbow and the jaw got, frame by frame.</summary>
-    static void Stream(string file, int port)
+    static void Stream(string file, int port, int other)
     {
         GsacAvatar avatar = GsacLoader.Load(File.ReadAllBytes(file), "person");
         var holder = avatar.gameObject;
@@ -398,6 +398,14 @@ public static class Play
             double degrees = 2 * Math.Atan2(q.y, q.w) * 180 / Math.PI;
             Console.WriteLine(degrees.ToString(CultureInfo.InvariantCulture) + " " + avatar.Weights[jaw].ToString(CultureInfo.InvariantCulture));
         }
+        // another port while the stream runs
+        int received = stream.Stream.Received;
+        stream.Stream.Port = other;
+        sender.Send(osc, osc.Length, new IPEndPoint(IPAddress.Loopback, port));
+        sender.Send(osc, osc.Length, new IPEndPoint(IPAddress.Loopback, other));
+        for (int i = 0; i < 200 && stream.Stream.Received == received; i++) System.Threading.Thread.Sleep(10);
+        System.Threading.Thread.Sleep(50);
+        Console.WriteLine("moved " + (stream.Stream.Received - received));
         // another file while the stream runs
         avatar.Use((byte[])File.ReadAllBytes(file).Clone());
         frame();
