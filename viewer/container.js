@@ -1,6 +1,6 @@
 // The container of a .gsac file: header, checksum, JSON head and blocks of numbers (docs/gsac-format.md).
 
-import { isTable } from "./json.js";
+import { isDeep, isTable } from "./json.js";
 
 const GSAC_MAGIC = [0x47, 0x53, 0x41, 0x43, 13, 10, 26, 10];
 const GSAC_VERSION = 1;
@@ -8,6 +8,7 @@ const GSAC_HEADER = 32;
 const GSAC_MAX_FILE = 256 * 2 ** 20;
 const GSAC_MAX_HEAD = 2 ** 20;
 const GSAC_MAX_BLOCKS = 1024;
+const GSAC_MAX_DEPTH = 100;
 const GSAC_TYPES = { f32: Float32Array, f16: Uint16Array, u8: Uint8Array, u16: Uint16Array, u32: Uint32Array, i16: Int16Array };
 
 // A file that breaks the format. fault: one of the format's fault names.
@@ -75,6 +76,7 @@ function parseHead(bytes) {
   } catch (e) {
     throw new GsacError("head", "it does not parse");
   }
+  if (isDeep(head, GSAC_MAX_DEPTH)) throw new GsacError("head", `it is nested more than ${GSAC_MAX_DEPTH} deep`);
   if (!isTable(head) || !isTable(head.blocks)) throw new GsacError("head", "it lacks the table `blocks`");
   if (Object.keys(head.blocks).length > GSAC_MAX_BLOCKS) throw new GsacError("block", "it lists too many blocks");
   return head;

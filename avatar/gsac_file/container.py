@@ -25,6 +25,8 @@ ALIGN = 16
 MAX_FILE = 256 << 20
 MAX_HEAD = 1 << 20
 MAX_BLOCKS = 1024
+MAX_DEPTH = 100
+"""Lists and tables of the head around one value."""
 MAX_AXES = 4
 MAX_LENGTH = 1 << 26
 DTYPES = {"f32": "<f4", "f16": "<f2", "u8": "u1", "u16": "<u2", "u32": "<u4", "i16": "<i2"}
@@ -106,6 +108,8 @@ def unpack(data: bytes, where: str = "avatar.gsac") -> tuple[dict, dict[str, np.
         head = json.loads(bytes(data[HEADER.size:start]), parse_constant=_refuse)
     except (ValueError, RecursionError) as e:
         raise bad(Fault.HEAD, f"it does not parse ({type(e).__name__})") from e
+    if _is_deep(head):
+        raise bad(Fault.HEAD, f"it is nested more than {MAX_DEPTH} deep")
     if not isinstance(head, dict) or not isinstance(head.get("blocks"), dict):
         raise bad(Fault.HEAD, "it lacks the table `blocks`")
     if len(head["blocks"]) > MAX_BLOCKS:
@@ -145,6 +149,15 @@ def _aligned(n: int) -> int:
 
 def _refuse(constant: str) -> float:
     raise ValueError(f"{constant} is not JSON")
+
+
+def _is_deep(value: object) -> bool:
+    """Whether a value lies in more than MAX_DEPTH lists and tables. Level by level: recursion has an end of its own."""
+    level = [value]
+    for _ in range(MAX_DEPTH + 1):
+        level = [inner for outer in level if isinstance(outer, (dict, list))
+                 for inner in (outer.values() if isinstance(outer, dict) else outer)]
+    return bool(level)
 
 
 def _entry_problem(entry: object, room: int) -> str | None:

@@ -64,6 +64,10 @@ def files(data):
                               b'{"x":01}', b'{"x":"\x01"}', b'{"x":"\\q"}', b"null", b'{"x":-}']):
         out[f"json{n}"] = built(text, b""), {"head"}
     head, body = parts(data)
+    for around, words in ((100, {"ok"}), (101, {"head"}), (2000, {"head"})):
+        for kind, (left, right) in {"lists": ("[", "]"), "tables": ('{"x":', "}")}.items():
+            inner = left * (around - 1) + "1" + right * (around - 1)  # the head is the first around it
+            out[f"{around}_{kind}"] = built(json.dumps(head)[:-1].encode() + f',"x":{inner}}}'.encode(), body), words
     for n, change in enumerate([
             {"offset": -16}, {"offset": 8}, {"offset": 1 << 60}, {"offset": 1e300}, {"offset": True}, {"offset": None},
             {"offset": "0"}, {"shape": [1 << 40, 3]}, {"shape": [-1, 3]}, {"shape": [1 << 26] * 4}, {"shape": "x"},
