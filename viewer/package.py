@@ -3,6 +3,7 @@ three.js, made of the modules of viewer.html."""
 
 from __future__ import annotations
 
+import argparse
 import re
 import sys
 from pathlib import Path
@@ -49,10 +50,10 @@ def write_package(folder: Path) -> None:
 
 
 def main() -> None:
-    if len(sys.argv) != 2:
-        sys.exit("usage: python -m gsac.viewer.package FOLDER")
+    parser = argparse.ArgumentParser(prog="python -m gsac.viewer.package", description="Writes the npm package gsac-avatar.")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="new or empty, or of an earlier package")
     try:
-        write_package(Path(sys.argv[1]))
+        write_package(parser.parse_args().folder)
     except OSError as error:
         sys.exit(str(error))
 

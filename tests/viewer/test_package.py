@@ -12,7 +12,7 @@ import pytest
 from gsac.avatar.gsac_file.write import avatar_bytes
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.benchmarks.viewer.frame_rate import serve
-from gsac.viewer.package import IMPORTED, package_files, write_package
+from gsac.viewer.package import IMPORTED, main, package_files, write_package
 
 NEEDS_BROWSER = pytest.mark.skipif(chromium.find_chromium() is None, reason="needs the Debian package chromium")
 SIZE, THREE = 400, "three@0.180.0"
@@ -98,6 +98,14 @@ def key(page, name):
     for kind in ("keyDown", "keyUp"):
         page.call("Input.dispatchKeyEvent", type=kind, key=name, code=name, text=name if len(name) == 1 else "",
                   windowsVirtualKeyCode={"Tab": 9, "ArrowRight": 39}.get(name, 0))
+
+
+def test_a_question_for_help_is_answered_and_makes_no_folder(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["package.py", "--help"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 0 and "FOLDER" in capsys.readouterr().out and not list(tmp_path.iterdir())
 
 
 def test_the_package_holds_every_module_that_it_imports_and_bears_the_programs_version():
