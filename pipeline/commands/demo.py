@@ -50,7 +50,8 @@ def make_truth_clip(folder: Path, journal: Journal) -> Path:
         return folder / CLIP_FILE
     from gsac.turntable.clip import make_clip
 
-    journal.starts("truth", f"a clip is made in {folder}")
+    journal.note(f"the clip is made in {folder}")
+    journal.starts("truth", "no clip yet")  # a reason goes into traces, which hold no paths
     began = time.monotonic()
     folder.parent.mkdir(parents=True, exist_ok=True)
     with half_made(folder.parent) as (temp, _):

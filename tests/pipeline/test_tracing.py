@@ -11,9 +11,11 @@ import time
 import pytest
 
 from gsac.pipeline import tracing
+from gsac.pipeline.commands.demo import make_truth_clip
 from gsac.pipeline.events import BatchEnded, BatchStarted, ClipEnded, ClipStarted, StageFailed, StageHit, StageStarted, StageWarning
 from gsac.pipeline.journal import Journal
 from gsac.pipeline.tracing import is_asked_for, traced
+from gsac.turntable import clip as turntable
 
 SECRET = "anna at home"
 
@@ -86,6 +88,18 @@ def test_a_batch_is_a_trace_of_clips_and_stages_and_names_nobody(collector):
     assert [event.name for event in spans["train"].events] == ["warning"] and spans["train"].status.code == 2
     assert SECRET.encode() not in b"".join(collector.raw), "no name of a clip, no path leaves"
     assert not any("warning" in event.to_line() and "OTEL" in event.to_line() for event in said)
+
+
+def test_the_demo_names_its_folder_to_people_and_not_to_the_trace(collector, tmp_path, monkeypatch):
+    def make_clip(folder, seed, progress):
+        folder.mkdir()
+        return folder / "clip.mp4"
+
+    monkeypatch.setattr(turntable, "make_clip", make_clip)
+    with traced(journal := Journal((said := []).append)):
+        make_truth_clip(tmp_path / SECRET, journal)
+    assert [attributes(span)["gsac.reason"] for span in collector.spans] == ["no clip yet"]
+    assert SECRET.encode() not in b"".join(collector.raw) and SECRET in said[0].message
 
 
 def test_names_and_errors_leave_where_they_are_asked_for(collector, monkeypatch):

@@ -198,4 +198,4 @@ def test_a_demo_keeps_a_folder_that_lies_where_its_clip_goes(tmp_path, monkeypat
     monkeypatch.setattr(clip, "make_clip", write_clip)
     journal = Journal(lambda event: said.append(words_of(event)))
     assert demo.make_truth_clip(tmp_path / "clip", journal).read_text() == "film"
-    assert (tmp_path / "clip-kept" / "holiday.mp4").read_text() == MINE and "clip-kept" in said[1]
+    assert (tmp_path / "clip-kept" / "holiday.mp4").read_text() == MINE and "clip-kept" in said[2]
