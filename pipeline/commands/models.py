@@ -12,6 +12,7 @@ from gsac.pipeline.model_check import check_model
 from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.project import OWN_STAGES
+from gsac.stages.counting import counted
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -23,7 +24,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     one.add_argument("names", nargs="*", metavar="NAME", help="default: all that a default run needs and that are missing")
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")
-    one.add_argument("name", metavar="NAME", help="as parameters refer to it, for example smplx.body_model")
+    one.add_argument("name", metavar="NAME",
+                     help="as parameters refer to it: my-body, for example, of smplx.body_model=my-body")
     one.add_argument("files", type=Path, nargs="+", metavar="FILE",
                      help="lpips-vgg, lpips-alex: one file with all weights, or the network's and the heads' one after the other; "
                           "a network whose weights lie beside it: all of its files")
@@ -63,7 +65,7 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
     names = arguments.names or list(MODELS)
     models.pull_optional(names, reporter.note)
     models.need(names, reporter.note)
-    reporter.result(f"{len(names)} model files are in {models.root}")
+    reporter.result(f"{counted(len(names), 'model file')} {'is' if len(names) == 1 else 'are'} in {models.root}")
     return ExitCode.OK
 
 

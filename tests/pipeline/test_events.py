@@ -12,6 +12,7 @@ from gsac.pipeline.events import (
     KINDS,
     LONGEST,
     BatchEnded,
+    BatchStarted,
     ClipEnded,
     ClipPlanned,
     Note,
@@ -58,6 +59,7 @@ def test_a_text_without_end_is_cut():
 def test_every_kind_has_words_for_people():
     assert WORDS.keys() == KINDS.keys() and KINDS.keys() >= TOLD
     assert all(isinstance(words_of(kind()), str) for kind in KINDS.values())
+    assert words_of(BatchStarted(clips=1, due=1)) == "batch of 1 clip starts, 1 to do"
 
 
 def test_a_line_that_a_kill_cut_off_is_ignored_and_the_next_run_appends_whole_lines(tmp_path):

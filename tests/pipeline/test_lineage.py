@@ -48,6 +48,7 @@ def test_of_equal_results_that_of_the_folder_counts_and_the_others_are_counted(f
     for folder, keep in ((finished.out, 100), (finished.root / "two", 50)):
         found = inside(finished, "lineage", folder / "left" / "out.txt", "--json").json
         assert found["stages"][0]["params"]["keep"] == keep
+    assert "  1 other run gave the same bytes" in inside(finished, "lineage", finished.out / "join" / "out.txt").out
     found = inside(finished, "lineage", finished.out / "join" / "out.txt", "--json").json
     left = next(stage for stage in one["stages"] if stage["stage"] == "left")
     assert found["stages"] == one["stages"] and found["same_bytes"] == {left["key"]: 1}

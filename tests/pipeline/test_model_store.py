@@ -255,12 +255,21 @@ def test_adding_without_a_file_is_answered_by_a_sentence(store):
         ModelStore(store).add("mine")
 
 
-@pytest.mark.parametrize("name", ["", "a/b", ".hidden"])
+@pytest.mark.parametrize("name", ["", "a/b", ".hidden", "my body", "a=b", "a\n"])
 def test_a_name_that_is_no_name_is_refused(store, tmp_path, name):
     file = tmp_path / "f"
     file.write_bytes(b"x")
     with pytest.raises(BadInput, match="not a name"):
         ModelStore(store).add(name, file)
+
+
+def test_a_name_from_before_that_would_be_refused_now_still_works(store, tmp_path):
+    file = tmp_path / "f"
+    file.write_bytes(b"x")
+    ModelStore(store).add("my.body-2_b", file)
+    brought = store.root / "models" / "brought.json"
+    brought.write_text(brought.read_text().replace("my.body-2_b", "my body"))
+    assert ModelStore(store).add("my body", file).read_bytes() == b"x"
 
 
 def test_an_unknown_name_is_told_with_the_known_ones(store):
