@@ -169,8 +169,8 @@ def take_request(arguments: argparse.Namespace) -> dict[str, Any]:
             raise BadInput(f"--resume takes the clips from {arguments.out / FILE}; leave {arguments.source} out")
         if given := [name for name in REQUEST if getattr(arguments, name) not in (None, False, [], STANDARD)]:
             option = "--from" if given[0] == "start" else f"--{given[0]}"
-            raise BadInput(f"--resume takes {option} from {arguments.out / FILE}, as the batch was begun; leave {option} out, or run "
-                           f"the batch anew without --resume, which takes from the cache what is the same")
+            raise BadInput(f"--resume takes {option} from {arguments.out / FILE}, as the batch was begun; leave {option} out, or "
+                           "begin a batch anew without --resume: what is the same comes from the cache")
         request = read_request(arguments.out.absolute() / FILE)
         for name in REQUEST:
             value = request.get(name)

@@ -45,8 +45,8 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     if arguments.pose not in (None, *get_args(Pose)):
         raise BadInput(f"--pose {arguments.pose}: expected {' or '.join(get_args(Pose))}")
     if arguments.pose is not None and arguments.format not in POSED:
-        raise BadInput(f"--pose {arguments.pose}: {arguments.format} has no pose of its own, since it moves; leave it out, or choose "
-                       f"{' or '.join(POSED)}")
+        raise BadInput(f"--pose {arguments.pose}: {arguments.format} has no pose of its own, since it moves; leave it out, or "
+                       f"choose {' or '.join(POSED)}")
     file = find_avatar(arguments.avatar)
     out = (arguments.out or Path(f"{name_avatar(file)}.{arguments.format}")).absolute()
     if out.suffix.lower() != f".{arguments.format}" or not out.parent.is_dir():

@@ -701,7 +701,7 @@ def test_two_runs_stand_side_by_side_with_the_parameters_that_differ(whole, copi
     assert len(page.images("head")) == 2 * (1 + 2 + 1)
 
 
-def test_compare_says_what_is_wrong_before_it_draws_and_writes_the_page_whole_or_not_at_all(whole, copied, tmp_path, capsys, monkeypatch):
+def test_compare_says_what_is_wrong_before_it_draws_and_writes_all_or_nothing(whole, copied, tmp_path, capsys, monkeypatch):
     def refused(*words):
         assert execute(["compare", str(whole), *map(str, words)]) == 2
         said = capsys.readouterr().err
