@@ -3,7 +3,7 @@
 
 // Options that pick what is seen: with one of them nothing turns by itself.
 const PICKED = ["clip", "pose", "t", "yaw", "pitch", "dist", "target", "still"];
-// All of them.
+// All but `rate`, which is of the page alone.
 export const OPTIONS = [...PICKED, "fov", "bg", "expression", "joints", "light", "lamp", "turntable", "draw"];
 const RENDERER_NAMES = ["webgpu", "webgl", "software"];
 // Names that a sentence lists at most.
