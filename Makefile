@@ -44,7 +44,7 @@ debian:
 params: setup
 	$(BIN)/python -m gsac.pipeline.params
 
-# Writes docs/cli.md and docs/stages/ from the commands and the stages' declarations.
+# Writes cli.md, events.md, findings.md, quality.md and stages/ in docs/ from the code.
 docs: setup
 	$(BIN)/python -m gsac.pipeline.reference
 

@@ -80,14 +80,14 @@ def defaults_yaml(project: Project) -> str:
 
 
 def meanings(config: type) -> dict[str, str]:
-    """Field -> the line of meaning under it in the dataclass's source."""
+    """Field -> the line of meaning under it in the source of a dataclass, or of an enum."""
     declaration = ast.parse(textwrap.dedent(inspect.getsource(config))).body[0]
     assert isinstance(declaration, ast.ClassDef)
     found = {}
     for field, after in itertools.pairwise(declaration.body):
-        if (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
-                and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)):
-            found[field.target.id] = " ".join(str(after.value.value).split())
+        target = field.target if isinstance(field, ast.AnnAssign) else field.targets[0] if isinstance(field, ast.Assign) else None
+        if isinstance(target, ast.Name) and isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant):
+            found[target.id] = " ".join(str(after.value.value).split())
     return found
 
 

@@ -1,5 +1,5 @@
 """Writes the reference pages from the code: docs/cli.md of all commands, docs/quality.md of the presets, docs/events.md of what
-runs tell, docs/stages/<name>.md of each stage."""
+runs tell, docs/findings.md of what stages find wrong with a clip, docs/stages/<name>.md of each stage."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import argparse
 import dataclasses
 import importlib
 import inspect
+import re
 import types
 import typing
 from collections.abc import Iterable, Iterator
@@ -14,9 +15,10 @@ from typing import Any
 
 from gsac.pipeline import commands
 from gsac.pipeline.cli import make_parser
+from gsac.pipeline.clip_check import FRAMES, Prospect
 from gsac.pipeline.cost_model import stage_cost
-from gsac.pipeline.event_file import LIMIT
-from gsac.pipeline.events import KINDS, Event, StageEvent
+from gsac.pipeline.event_file import LIMIT, PROGRESS_GAP_S
+from gsac.pipeline.events import KINDS, LONGEST, Event, StageEvent
 from gsac.pipeline.footage import Footage, keep
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.outcomes import ExitCode, Outcome
@@ -27,6 +29,9 @@ from gsac.pipeline.project import Project
 from gsac.pipeline.quality import QUALITIES, dial_names
 from gsac.pipeline.run_folder import EVENTS, OLDER_EVENTS
 from gsac.stages.contract import BadInput, Stage
+from gsac.stages.findings import Code
+from gsac.stages.first_look import FirstLook
+from gsac.stages.severity import Severity
 
 WRITTEN = "<!-- Written by `make docs` from the code; edit the docstrings there. -->\n"
 
@@ -35,15 +40,40 @@ EVENTS_LEAD = f"""\
 Whatever a run or a batch tells is an event: the terminal, `batch.json`, `batch.prom` and traces are drawn from the same stream.
 
 - `{EVENTS}` in the folder of a run or a batch holds them, a JSON object a line; later runs append. From {LIMIT >> 20} MB on it goes
-  on in a new file, and the one before is `{OLDER_EVENTS}`. A batch's file leaves progress and lines of logs to those of its clips.
-- `gsac events [DIR] [--follow]` prints them as a person reads them.
+  on in a new file, and the one before is `{OLDER_EVENTS}`. A batch's file leaves progress and lines of logs to those of its clips;
+  a clip's keeps the progress of a stage every {PROGRESS_GAP_S:g} s at most.
+- `gsac events [DIR]` prints them as a person reads them, progress and lines of logs only with `--follow` or `-v`.
 - `gsac run --events` and `gsac batch --events` print them on stdout as they happen, before the result.
 - With `pip install 'gsac[otel]'` and `OTEL_EXPORTER_OTLP_ENDPOINT=http://HOST:4318` they become a trace, sent over HTTP: a span
   for the batch, in it one a clip, in it one a stage, with key, outcome, device and figures. `OTEL_*` is all its configuration.
   Names of clips and errors stay out unless `OTEL_RESOURCE_ATTRIBUTES` has `gsac.names=true`.
 
-A field that holds what it holds without being told (empty, 0, null, the first attempt) is left out. Readers pass over kinds and
+The field `event` holds the kind, by the names below. A field that holds what it holds without being told (empty, 0, null, the first
+attempt) is left out. A text of more than {LONGEST:,} characters is cut to that, its last one `…`. Readers pass over kinds and
 fields that they do not know, and over a line that is no JSON: a kill cuts the last one off."""
+
+
+FINDINGS_LEAD = """\
+What a stage finds wrong with a clip is a sentence for people and a finding for programs.
+
+- `run.json` in the folder of a run, and `--json` of `gsac run`, have in each stage of `stages` the sentences as `warnings` and
+  their findings, in the same order, as `findings`. A result that an older version computed may have sentences alone.
+- `events.jsonl` has code and severity with each warning ([events](events.md#stage_warning)); `batch.prom` counts warnings by code.
+- `gsac check --json` has the findings of all stages in one list, each with its sentence (`message`)."""
+FINDING = {
+    "code": "One of the [codes](#codes).",
+    "severity": "Of the code.",
+    "frames": "The frames concerned: runs of them, `[first, last]`, from 0; empty where it is the clip as a whole.",
+    "figure": "How much or how many, `{figure}` of the sentence, a share as 0..1; null where there is none.",
+}
+"""Field of a finding -> its meaning."""
+CHECK = {
+    "prospect": "One of the words below.",
+    "seen": "The clip at a glance, below.",
+    "times_s": f"When the {FRAMES} frames or fewer that were looked at lie in the clip, s; null for photos.",
+    "findings": "Each with `message`. Their frames count among those that were looked at.",
+}
+"""Field of `gsac check --json`, besides those of every command -> its meaning."""
 
 
 EXAMPLE, EXAMPLE_CORES = Footage(60, 720, 1280), 2
@@ -53,6 +83,7 @@ EXAMPLE, EXAMPLE_CORES = Footage(60, 720, 1280), 2
 def pages(project: Project) -> dict[str, str]:
     """Path below docs/ -> text, of every page."""
     return {"cli.md": cli_page(), "quality.md": quality_page(project), "events.md": events_page(),
+            "findings.md": findings_page(),
             **{f"stages/{name}.md": stage_page(project, name) for name in project.graph.steps}}
 
 
@@ -83,6 +114,32 @@ def events_page() -> str:
         base = StageEvent if issubclass(kind, StageEvent) else Event
         blocks += [f"## {kind.kind}", inspect.getdoc(kind) or "", _fields(kind, _own_fields(base))]
     return "\n\n".join(filter(None, blocks)) + "\n"
+
+
+def findings_page() -> str:
+    """Every code with severity, sentence and advice; the fields of a finding, and what `gsac check --json` has besides."""
+    graves, seen = meanings(Severity), meanings(FirstLook)
+    codes = ((f"`{code.word}`", f"`{code.value.severity.value}`", _plain(code.value.sentence), code.value.advice) for code in Code)
+    prospects = ((f"`{word.value}`", word.sentence, str(int(word.exit_code))) for word in Prospect)
+    blocks = ["# Findings", WRITTEN.strip(), FINDINGS_LEAD, _table(("field", ""), _as_code(FINDING)),
+              "## Severities", _table(("severity", "what it takes from the avatar"),
+                                      ((f"`{severity.value}`", graves[severity.name]) for severity in Severity)),
+              "## Codes", "In the sentences `{frames}` are the frames concerned, `{figure}` is the figure; other names stand for words "
+              "and numbers.", _table(("code", "severity", "sentence", "what to do"), codes),
+              "## What `gsac check --json` has besides", _table(("field", ""), _as_code(CHECK)),
+              "`prospect`, by the worst finding:", _table(("word", "", "exit code"), prospects),
+              "`seen`; sizes in px, 0 where the part was never seen:",
+              _table(("field", ""), _as_code({field.name: seen[field.name] for field in dataclasses.fields(FirstLook)}))]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _as_code(rows: dict[str, str]) -> Iterator[tuple[str, str]]:
+    return ((f"`{name}`", text) for name, text in rows.items())
+
+
+def _plain(sentence: str) -> str:
+    """A format string with the names of its words alone, as `code`."""
+    return re.sub(r"\{(\w+)[^}]*\}", r"`{\1}`", sentence)
 
 
 def _own_fields(kind: type[Event]) -> tuple[str, ...]:

@@ -27,13 +27,17 @@ class FirstLook:
     """The clip at a glance. Sizes in px; 0 where the part was never seen."""
 
     frames: int
+    """That were looked at."""
     seen: int
     """Frames with a person."""
     height_px: float
+    """Of the person, head to feet."""
     turn: float
     """Degrees of 360 from which the person was seen."""
     face_px: float
+    """Longer side of the face where it is seen well."""
     hand_px: float
+    """Likewise of a hand."""
 
     @classmethod
     def of(cls, points: dict[str, np.ndarray]) -> FirstLook:

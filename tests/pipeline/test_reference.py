@@ -5,8 +5,12 @@ import argparse
 import pytest
 
 from gsac.pipeline import commands
+from gsac.pipeline.clip_check import ClipCheck, Prospect
 from gsac.pipeline.project import Project, shipped_dag
-from gsac.pipeline.reference import cli_page, pages, stage_page
+from gsac.pipeline.reference import CHECK, FINDING, cli_page, pages, stage_page
+from gsac.stages.findings import Code, Finding
+from gsac.stages.first_look import FirstLook
+from gsac.stages.severity import Severity
 
 DOCS = shipped_dag().with_name("docs")
 PROJECT = Project("gsac.stages", shipped_dag())
@@ -24,7 +28,8 @@ def test_the_pages_in_docs_are_those_that_the_code_gives(made):
 
 
 def test_there_is_a_page_for_each_stage_and_for_nothing_else(made):
-    assert {f"stages/{page.name}" for page in (DOCS / "stages").iterdir()} == set(made) - {"cli.md", "quality.md", "events.md"}
+    assert {f"stages/{page.name}" for page in (DOCS / "stages").iterdir()} == set(made) - {
+        "cli.md", "quality.md", "events.md", "findings.md"}
 
 
 @pytest.mark.parametrize("name", commands.COMMANDS)
@@ -43,6 +48,21 @@ def test_every_parameter_stands_on_its_stages_page_with_default_and_meaning(made
     page = made["stages/split.md"]
     assert "| `split.count` | int or null | `120` | Most frames kept in all" in page
     assert "`frames`" in page and "[keypoints](keypoints.md)" in page
+
+
+@pytest.mark.parametrize("code", Code)
+def test_every_code_of_a_finding_stands_on_its_page_with_severity_and_advice(code, made):
+    row = next(line for line in made["findings.md"].splitlines() if line.startswith(f"| `{code.word}` |"))
+    assert row.startswith(f"| `{code.word}` | `{code.value.severity.value}` | ") and row.endswith(f" | {code.value.advice} |")
+
+
+def test_every_field_of_a_finding_and_of_a_check_has_its_meaning(made):
+    look = FirstLook(1, 1, 1.0, 360.0, 1.0, 1.0)
+    assert list(FINDING) == list(Finding.of(Code.FACE_AT_REST).to_json())
+    assert list(CHECK) == list(ClipCheck(look, None, []).to_json())
+    for word in (*FINDING, *CHECK, *vars(look), *Severity, *(prospect.value for prospect in Prospect)):
+        assert f"| `{word}` | " in made["findings.md"], word
+    assert "|  |\n" not in made["findings.md"].split("## What `gsac check")[1].replace("| field |  |\n", "")
 
 
 def test_a_stage_of_another_project_has_its_page(toy):
