@@ -60,11 +60,12 @@ def declare(command: argparse.ArgumentParser) -> None:
                          help=f"gets a folder a clip, {PAGE}, which shows all of them, and {FILE} (default: here)")
     command.add_argument("--executor", default="local", metavar="NAME", help=f"one of: {', '.join(EXECUTORS)}")
     command.add_argument("-j", "--jobs", type=int, metavar="N",
-                         help="clips at once (default: half as many as cores; 1 on a GPU)")
+                         help="clips at once (default: half as many as cores; 1 on a GPU); not with --executor ray")
     command.add_argument("--memory", type=float, metavar="GB",
                          help=f"memory that clips at once may fill, by what they took before (default: {SHARE:g} of the machine's)")
     command.add_argument("--address", metavar="HOST:PORT",
-                         help="of the Ray cluster (default: the one that RAY_ADDRESS names, else this machine alone)")
+                         help="of the Ray cluster (default: the one that RAY_ADDRESS names, else that of the last `ray start` "
+                              "here, else this machine alone)")
     command.add_argument("--until", metavar="STAGE", help="stop after this stage")
     command.add_argument("--from", dest="start", metavar="STAGE", help="what this stage needs must be in the cache already")
     command.add_argument("--force", action="append", default=[], metavar="STAGE", help="run this stage again; may be repeated")

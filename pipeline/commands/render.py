@@ -40,8 +40,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("avatar", type=Path, metavar="AVATAR",
                          help="avatar.gsac, or the folder of a run or its export folder")
     command.add_argument("--motion", metavar="FILE",
-                         help="a .bvh, .fbx (Mixamo), .glb, .vrma or AMASS-style .npz file, or the name of a clip in the "
-                              "avatar (walk, wave); without it the avatar is seen from all sides")
+                         help="a .bvh, .fbx (Mixamo), .glb, .vrma, .gltf with its buffers inside or AMASS-style .npz file, or the "
+                              "name of a clip in the avatar (walk, wave); without it the avatar is seen from all sides")
     command.add_argument("--out", type=Path, metavar="FILE",
                          help="a .mp4, .webm, .mov (ProRes 4444) or .gif, or a new folder for PNG pictures; "
                               "default: <avatar>-<motion>.mp4 here, without a motion <avatar>-turn.mp4")

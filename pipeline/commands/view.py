@@ -31,8 +31,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--port", type=int, default=0, metavar="N", help="default: any free one")
     command.add_argument("--no-browser", action="store_true", help="only say the address")
     command.add_argument("--host", action="store_true",
-                         help="serve to the network too, for a phone or a headset, at an address nobody can guess; by https, which VR "
-                              "and AR need, where the program openssl is there, else by plain http")
+                         help="serve to the network too, for a phone or a headset, at an address nobody can guess; by https, "
+                              "which VR and AR need, where the program openssl is there, else by plain http")
     command.set_defaults(do=do)
 
 
