@@ -118,7 +118,7 @@ class Child:
         self.log = self.log.replace(log)
 
     def _tell(self, words: dict[str, Any]) -> None:
-        with contextlib.suppress(BrokenPipeError):  # died at once: `run` sees it
+        with contextlib.suppress(BrokenPipeError):  # died at once: `follow` sees it
             self._orders.write(json.dumps(words).encode() + b"\n")
             self._orders.flush()
 

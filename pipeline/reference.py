@@ -124,8 +124,9 @@ def findings_page() -> str:
     blocks = ["# Findings", WRITTEN.strip(), FINDINGS_LEAD, _table(("field", ""), _as_code(FINDING)),
               "## Severities", _table(("severity", "what it takes from the avatar"),
                                       ((f"`{severity.value}`", graves[severity.name]) for severity in Severity)),
-              "## Codes", "In the sentences `{frames}` are the frames concerned, `{figure}` is the figure; other names stand for words "
-              "and numbers.", _table(("code", "severity", "sentence", "what to do"), codes),
+              "## Codes",
+              "In the sentences `{frames}` are the frames concerned, `{figure}` is the figure; other names stand for "
+              "words and numbers.", _table(("code", "severity", "sentence", "what to do"), codes),
               "## What `gsac check --json` has besides", _table(("field", ""), _as_code(CHECK)),
               "`prospect`, by the worst finding:", _table(("word", "", "exit code"), prospects),
               "`seen`; sizes in px, 0 where the part was never seen:",

@@ -48,7 +48,7 @@ class Stage:
     programs: Callable[[], dict[str, str]] = dict
     """Programs that it runs, name -> path; their digests are part of the key."""
     models: Callable[[Any], tuple[str, ...]] = lambda config: ()
-    """Names of the model files that this configuration needs (`avatar.models`); their digests are part of the key."""
+    """Names of the model files that this configuration needs (`avatar.network_files`); their digests are part of the key."""
     wishes: Callable[[Any], tuple[str, ...]] = lambda config: ()
     """Names of model files that are used if they are here, brought or pulled; then their digests are part of the key too."""
     any_of: Callable[[Any], tuple[str, ...]] = lambda config: ()
