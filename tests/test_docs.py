@@ -153,6 +153,16 @@ def test_everything_in_the_tree_exists():
     assert not [str(path) for path in tree() if not (ROOT / path).exists()]
 
 
+@pytest.mark.parametrize("package", ["avatar", "cache", "pipeline", "stages"])
+def test_the_tree_names_every_module_that_stands_at_the_top_of_a_package(package):
+    """A module has a line of its own or stands in the description of another."""
+    drawn = blocks(ROOT / "docs" / "architecture.md")[-1].text
+    section = re.search(rf"^{package}/.*\n(?:  .*\n)*", drawn, re.MULTILINE)
+    assert section, package
+    missing = {path.name for path in (ROOT / package).glob("*.py")} - {"__init__.py"} - set(re.findall(r"\w+\.py\b", section[0]))
+    assert not missing
+
+
 def test_the_tree_names_every_folder_of_the_packages():
     """And of each stage."""
     named = set(tree())
