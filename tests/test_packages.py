@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 NEEDED = {re.match(r"[\w-]+", requirement)[0] for requirement in PROJECT["dependencies"]}
 EXTRAS = {re.match(r"[\w-]+", requirement)[0]
-          for extra in ("gpu", "gsplat", "s3") for requirement in PROJECT["optional-dependencies"][extra]}
+          for extra, requirements in PROJECT["optional-dependencies"].items() if extra != "dev" for requirement in requirements}
 COMMANDS = ("avatar", "benchmarks", "cache", "pipeline", "stages", "turntable", "unity", "viewer")
 """Our packages, which the command is made of; what tests alone use belongs to the extra dev."""
 
