@@ -14,7 +14,7 @@ from gsac.benchmarks.fit.clips import FitCase
 from gsac.benchmarks.fit.score import score
 from gsac.stages.contract import Job
 from gsac.stages.smplx import STAGE
-from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.config import Method, SmplxConfig
 
 
 @dataclass
@@ -32,7 +32,7 @@ class FitTrial:
     warnings: tuple[str, ...] = ()
 
 
-def fit(case: FitCase, method: str, focal_given: bool) -> FitTrial:
+def fit(case: FitCase, method: Method, focal_given: bool) -> FitTrial:
     """Runs the smplx stage on one clip. focal_given: whether clip.json holds the true focal length."""
     from gsac.stages.smplx.stage import run
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from gsac.stages.body_choice import OPEN, brought_files
 from gsac.stages.brought_file import NONE
 from gsac.stages.contract import BadInput
 
-METHODS = ("lm", "paper", "brought")
+Method = Literal["lm", "paper", "brought"]
 
 
 @dataclass
 class SmplxConfig:
-    method: str = "lm"
+    method: Method = "lm"
     """Solver of the fit. `lm`: Levenberg-Marquardt over all frames at once; `paper`: the published co-registration by Adam, slower
     and less exact; `brought`: the poses of `start` as they are."""
     start: str = NONE
@@ -58,8 +59,6 @@ class SmplxConfig:
 
     def check(self) -> None:
         """Raises BadInput where a value is out of range."""
-        if self.method not in METHODS:
-            raise BadInput(f"smplx.method is {self.method!r}; choose one of {', '.join(METHODS)}")
         if self.method == "brought" and self.start == NONE:
             raise BadInput("smplx.method is 'brought', but smplx.start names no poses; bring them with `gsac models add NAME FILE`")
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:

@@ -15,7 +15,7 @@ from gsac.stages.contract import Job, StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.missing_frames import pair_masks
 from gsac.stages.person_seen import find_seen
-from gsac.stages.smplx.config import SmplxConfig
+from gsac.stages.smplx.config import Method, SmplxConfig
 from gsac.stages.smplx.detector_errors import find_errors
 from gsac.stages.smplx.expression import translate_expression, translate_rest
 from gsac.stages.smplx.flame_motion import read_shared
@@ -31,6 +31,9 @@ from gsac.stages.smplx.state import Fit, to_params
 from gsac.stages.smplx.warmup import rehearse
 from gsac.stages.turn_pace import pace
 
+FitClip = Callable[[Body, Sightings, list[Outline], SmplxConfig, Callable[[int, int, str], None]], Fit]
+"""Fits the clip: body, what was seen, the outlines, parameters, progress."""
+
 
 def fit_as_published(body: Body, sightings: Sightings, outlines: list[Outline], config: SmplxConfig,
                      progress: Callable[[int, int, str], None]) -> Fit:
@@ -44,9 +47,9 @@ FOCAL = 0.6, 3.0
 """Focal lengths of phones' lenses over the longer side of the picture; the main ones' are 0.8 to 1.1, of three times zoom 3."""
 KEPT = 0.05
 """Relative difference up to which the fit has a given focal length: its prior is 0.2 % wide."""
-METHODS = {"lm": fit_unmisled, "paper": fit_as_published, "brought": take_as_fit}
-"""smplx.method -> fit; config.METHODS are the same names."""
-BETAS = {"lm": 20, "paper": 100}
+METHODS: dict[Method, FitClip] = {"lm": fit_unmisled, "paper": fit_as_published, "brought": take_as_fit}
+"""smplx.method -> fit."""
+BETAS: dict[Method, int] = {"lm": 20, "paper": 100}
 """Leading betas that a method solves: later ones have a small variance, which one clip cannot determine, and the paper's fit has as
 many. `brought` takes all that the file has."""
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from typing import Final, Literal
 
 from gsac.stages.body_choice import OPEN, brought_files
 from gsac.stages.contract import BadInput
 
-RECIPES = ("fast", "paper")
-AUTO = "auto"
+Recipe = Literal["fast", "paper"]
+Device = Literal["auto", "cpu", "cuda"]
+Lpips = Literal["auto", "none", "judge", "loss", "vgg-hed"]
+AUTO: Final = "auto"
 """`gaussians` that the size search chooses; `device` that the engine chooses; `lpips` as the recipe has it."""
 FULL_SIZE = 12000
 """Gaussians that `largest` is meant for."""
@@ -24,8 +27,6 @@ SIZES = 3000, 30000
 """Least and most gaussians where none are asked for: `FULL_SIZE` for a person of `LARGE`, half as many for a quarter of it."""
 MORE_ON_CUDA = 1.5
 """Factor on them on the GPU, where they cost least."""
-DEVICES = (AUTO, "cpu", "cuda")
-LPIPS = (AUTO, "none", "judge", "loss", "vgg-hed")
 NETWORKS = ("lpips-vgg", "lpips-alex")
 VGG_HED = "vgg-hed"
 """The network whose features take the place of LPIPS in the loss; it is no LPIPS, and its figure has its own name."""
@@ -68,11 +69,11 @@ def read_numbers(text: int | str) -> list[int]:
 class TrainConfig:
     body_model: str = OPEN
     """Which body; the same as smplx.body_model."""
-    recipe: str = "fast"
+    recipe: Recipe = "fast"
     """Which optimisation fits the gaussians: fast; or paper, with one gaussian a face and its own rates."""
     paper_text: bool = False
     """Whether recipe paper has its losses as the paper's text: L2 and SSIM without alpha times mask, squared Sobel, no Dice."""
-    device: str = AUTO
+    device: Device = AUTO
     """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
     gaussians: int | str = AUTO
     """How many; auto: the smallest size whose held-out frames score as well as with as many as the person's pixels ask for: 12,000
@@ -135,7 +136,7 @@ class TrainConfig:
     """Steps of the test-time pose optimisation for the `*_ttpo` figures; 0 leaves these figures null."""
     flip: bool = False
     """Whether to judge held-out frames by FLIP, too, at 67 pixels a degree."""
-    lpips: str = AUTO
+    lpips: Lpips = AUTO
     """Where LPIPS is used, with weights that `gsac models add` brought: none; judge: metrics only; loss: also in the training loss
     (on the CPU only recipe paper, takes hours); vgg-hed: judge, and in its place in the loss the VGG features of HED; auto: with
     weights, loss for recipe paper, otherwise judge. Those VGG features are measured wherever LPIPS may be, once they are pulled."""
@@ -171,12 +172,6 @@ class TrainConfig:
 
     def check(self) -> None:
         """Raises BadInput that names the first value that cannot be."""
-        if self.recipe not in RECIPES:
-            raise BadInput(f"train.recipe is {self.recipe!r}; choices: {', '.join(RECIPES)}")
-        if self.device not in DEVICES:
-            raise BadInput(f"train.device is {self.device!r}; choices: {', '.join(DEVICES)}")
-        if self.lpips not in LPIPS:
-            raise BadInput(f"train.lpips is {self.lpips!r}; choices: {', '.join(LPIPS)}")
         if self.recipe == "paper" and self.exposure:
             raise BadInput("train.exposure is learned by recipe fast only; set train.recipe to fast, or train.exposure to false")
         if self.paper_text and self.recipe != "paper":

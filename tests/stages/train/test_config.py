@@ -3,6 +3,7 @@
 import json
 from dataclasses import fields
 from types import SimpleNamespace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -23,8 +24,14 @@ from gsac.stages.train.views import View
 
 
 def test_every_recipe_has_an_entry_for_every_device():
-    assert set(RECIPES) == {(name, device) for name in config.RECIPES for device in config.DEVICES if device != config.AUTO}
-    assert {config.AUTO, *BACKENDS} == set(config.DEVICES) == {AUTO, *DEVICES}, "and the engine has the same devices"
+    assert set(RECIPES) == {(name, device) for name in get_args(config.Recipe) for device in BACKENDS}
+    assert {config.AUTO, *BACKENDS} == set(get_args(config.Device)) == {AUTO, *DEVICES}, "and the engine has the same devices"
+
+
+@pytest.mark.parametrize("name,kind", [("recipe", config.Recipe), ("device", config.Device), ("lpips", config.Lpips)])
+def test_a_choice_that_is_none_is_told_what_there_is(name, kind):
+    with pytest.raises(BadInput, match=f"train.{name} is 'magic'; choices: {', '.join(get_args(kind))}"):
+        make_config(STAGE, {name: "magic"})
 
 
 def test_the_docstrings_of_the_parameters_tell_the_full_size():
@@ -98,7 +105,7 @@ def test_lpips_is_in_the_loss_of_recipe_paper_and_of_fast_only_where_asked_and_a
     from gsac.stages.train.stage import without_lpips
 
     told = {(recipe, lpips): TrainConfig(recipe=recipe, lpips=lpips).in_loss()
-            for recipe in config.RECIPES for lpips in config.LPIPS}
+            for recipe in get_args(config.Recipe) for lpips in get_args(config.Lpips)}
     assert {wish: name for wish, name in told.items() if name} == {
         ("paper", "auto"): "lpips-vgg", ("paper", "loss"): "lpips-vgg", ("fast", "loss"): "lpips-vgg",
         ("paper", "vgg-hed"): "vgg-hed", ("fast", "vgg-hed"): "vgg-hed"}
