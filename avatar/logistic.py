@@ -22,3 +22,8 @@ def clipped_sigmoid(x: Real) -> Real:
 def logit(p: Real) -> Real:
     """The inverse of `sigmoid`. p: scalar or (...), inside 0..1."""
     return np.log(p / (1 - p))
+
+
+def opacity_logit(opacity: np.ndarray) -> np.ndarray:
+    """`logit` of opacity (N,), kept off 0 and 1; in its precision."""
+    return logit(np.clip(opacity, 1e-4, 1 - 1e-4))

@@ -8,11 +8,11 @@ import numpy as np
 
 from gsac.avatar.cuda.arrays import Shot
 from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, rates_of
-from gsac.avatar.cuda.trainer import CudaTrainer, opacity_logit
+from gsac.avatar.cuda.trainer import CudaTrainer
 from gsac.avatar.draw_rule import ADDED, LowPass
 from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.logistic import sigmoid
+from gsac.avatar.logistic import opacity_logit, sigmoid
 
 NEAREST = 3
 """Gaussians of a neighbourhood, the gaussian itself included."""
@@ -133,7 +133,7 @@ class PaperTrainer(CudaTrainer):
 
     def _values(self, gaussians: PaperGaussians) -> dict[str, np.ndarray]:
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.scale_logit, "rgb": gaussians.rgb,
-                "logit": opacity_logit(gaussians.opacity), "start": gaussians.mu}
+                "logit": opacity_logit(gaussians.opacity.astype(np.float64)), "start": gaussians.mu}
 
     def _upload_gaussians(self, values: dict[str, np.ndarray]) -> None:
         super()._upload_gaussians(values)

@@ -14,7 +14,7 @@ from gsac.avatar.cuda.structs import State
 from gsac.avatar.cuda.uploads import make_pairs, make_scratch, upload_body, upload_gaussians, upload_shots
 from gsac.avatar.feature_distance import FeatureDistance
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.logistic import logit, sigmoid
+from gsac.avatar.logistic import opacity_logit, sigmoid
 
 REPLAY = 10
 """Steps of one graph."""
@@ -221,7 +221,7 @@ class CudaTrainer:
     def _values(self, gaussians: Any) -> dict[str, np.ndarray]:
         """Buffer's name -> its content, (N, ...). gaussians: those that this kind of trainer starts from."""
         return {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
-                "logit": opacity_logit(gaussians.opacity), "start": gaussians.mu}
+                "logit": opacity_logit(gaussians.opacity.astype(np.float64)), "start": gaussians.mu}
 
     def _make_scratch(self) -> None:
         make_scratch(self.arrays, self.recipe)
@@ -287,9 +287,3 @@ class CudaTrainer:
         for name, value in values.items():
             setattr(state, name, value)
         self.buffers["state"].write(np.frombuffer(bytes(state), np.uint8))
-
-
-def opacity_logit(opacity: np.ndarray) -> np.ndarray:
-    """(N,) float64 of opacity (N,), which is kept off 0 and 1."""
-    opacity = np.clip(opacity.astype(np.float64), 1e-4, 1 - 1e-4)
-    return logit(opacity)

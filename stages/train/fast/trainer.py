@@ -19,7 +19,7 @@ import numpy as np
 from gsac.avatar import losses
 from gsac.avatar.binding import face_frames
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.logistic import logit, sigmoid
+from gsac.avatar.logistic import opacity_logit, sigmoid
 from gsac.avatar.raster import BoundGradients, render_bound, render_bound_backward
 from gsac.avatar.threads import Workspace, kernel_threads, on_each, side_by_side
 from gsac.stages.train.checkpoint import State
@@ -313,8 +313,3 @@ def learned_values(gaussians: Gaussians) -> dict[str, np.ndarray]:
     values = {"mu": gaussians.mu, "quat": gaussians.quat, "log_scale": gaussians.log_scale, "rgb": gaussians.rgb,
               "opacity_logit": opacity_logit(gaussians.opacity)[:, None]}
     return {name: np.array(value, np.float32, order="C") for name, value in values.items()}
-
-
-def opacity_logit(opacity: np.ndarray) -> np.ndarray:
-    """(N,) of opacity (N,), which is kept off 0 and 1."""
-    return logit(np.clip(opacity, 1e-4, 1 - 1e-4))

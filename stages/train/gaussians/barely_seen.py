@@ -12,8 +12,9 @@ from scipy.sparse import coo_matrix
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.gaussians.disc_area import divisible_areas
 from gsac.stages.train.gaussians.nearest import find_nearest
-from gsac.stages.train.gaussians.unseen import AROUND, NEIGHBOURS, disc_areas, hold_colours
+from gsac.stages.train.gaussians.unseen import AROUND, NEIGHBOURS, hold_colours
 from gsac.stages.train.poses.bundle_adjust import conjugate_gradients
 
 FACING = 0.3
@@ -45,7 +46,7 @@ def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray,
     normals = frames.R[gaussians.face, :, 1]
     near = find_nearest(bound.means, bound.means, AROUND)
     alike = np.einsum("nki,ni->nk", normals[near], normals)
-    areas = disc_areas(bound)
+    areas = divisible_areas(bound)
     evidence = find_evidence(pixels, areas, seen, near, alike)
     out = gaussians[np.arange(len(gaussians))]
     own = np.where(seen, pixels / max(float(np.median(pixels[seen])), 1e-12), 1)  # the unseen were laid in colours of their cloth

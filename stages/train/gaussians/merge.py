@@ -15,7 +15,8 @@ from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.nearest_rotation import nearest_quaternions
-from gsac.stages.train.gaussians.merge_kernels import disc_areas, join_spreads, place_joined, take_free, weigh_pairs
+from gsac.stages.train.gaussians.disc_area import disc_areas
+from gsac.stages.train.gaussians.merge_kernels import join_spreads, place_joined, take_free, weigh_pairs
 from gsac.stages.train.gaussians.nearest import find_nearest
 
 NEIGHBOURS = 8

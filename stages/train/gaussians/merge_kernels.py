@@ -75,17 +75,6 @@ def take_free(pairs, order, most, free):
     return taken[:count]
 
 
-@own_kernel(nogil=True)
-def disc_areas(scales):
-    """(N,) m2, product of the two larger of scales (N, 3) m."""
-    out = np.empty(len(scales))
-    for i in range(len(scales)):
-        a, b, c = np.float64(scales[i, 0]), np.float64(scales[i, 1]), np.float64(scales[i, 2])
-        least, most = min(a, b), max(a, b)
-        out[i] = max(least, min(most, c)) * max(most, c)
-    return out
-
-
 @own_kernel(nogil=True, error_model="numpy")
 def join_spreads(keep, drop, share, places, rotations, scales, middle, spread):
     """middle (P, 3) m and spread (P, 3, 3) m2, written: of gaussians `keep` and `drop`, (P,) indices, by share (P,) of the first.

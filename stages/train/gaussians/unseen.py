@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
+from gsac.avatar.binding import FaceFrames, bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.avatar.light import shade
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace
+from gsac.stages.train.gaussians.disc_area import divisible_areas
 from gsac.stages.train.gaussians.nearest import find_nearest
 
 BEHIND, FRONT = -0.2, 0.3
@@ -48,14 +49,9 @@ def front_pixels(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, 
 def find_seen(pixels: np.ndarray, gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(N,) bool, whether gaussians are seen. pixels: (N,) `front_pixels`, mean over the frames; rest: (V, 3) m; faces: (F, 3)."""
     bound = bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    share = pixels / disc_areas(bound)
+    share = pixels / divisible_areas(bound)
     seen = pixels > LEAST_SHOWN
     return seen & (share > LEAST_SHARE * np.median(share[seen])) if seen.any() else seen
-
-
-def disc_areas(bound: Bound) -> np.ndarray:
-    """(N,) m2 and above 0, the product of each gaussian's two largest standard deviations."""
-    return np.maximum(np.sort(bound.scales, 1)[:, 1:].prod(1), 1e-12)
 
 
 def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
