@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gsac.stages.handgap.config import HandgapConfig
+from gsac.stages.handgap.gap_frames import pick_frames
 from gsac.stages.handgap.missing_hands import runs
 from gsac.stages.handgap.turn_estimate import SEEN_SCORE, estimate_turn, locate_centre, smooth_centre
 
@@ -31,8 +32,8 @@ LIKELY = 4.0
 """Grid entries this far below the best log likelihood get no weight."""
 BIAS_SHARE = 0.3
 """Share of the motion that belongs to the image and not to the body: the detector's systematic error."""
-MOST_FRAMES, NEAR_S = 200, 1.5
-"""With more seen frames, a gap is filled from those within NEAR_S seconds and every n-th of the others."""
+MOST_FRAMES = 200
+"""Of more seen frames, the points are told from about so many (`pick_frames`)."""
 
 
 @dataclass
@@ -87,7 +88,7 @@ def predict_about_palm(tracks: np.ndarray, lead: int, seen: np.ndarray, asked: n
 
     Returns places (A, P, 2) px from the palm, in the A asked frames.
     """
-    known = pick_frames(seen, asked, body.times)
+    known = pick_frames(seen, asked, body.times, MOST_FRAMES)
     places = [_along(axis, tracks[known][:, :, axis] / body.torso, lead, known, asked, body) for axis in range(2)]
     return np.stack(places, 2) * body.torso
 
@@ -123,14 +124,3 @@ def covariance(axis: int, turn: np.ndarray, other_turn: np.ndarray, time: np.nda
         fixed = REACH**2 * np.cos(apart) + OFFSET**2 + BEND**2 * np.cos(2 * apart)
         return fixed + motion**2 * near * (np.cos(apart) + BIAS_SHARE**2)
     return REACH**2 + TILT**2 * np.cos(apart) + BEND**2 * np.cos(2 * apart) + motion**2 * near
-
-
-def pick_frames(seen: np.ndarray, asked: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """seen, asked: (T,) bool; times: (T,) s. Returns (K,) indices of the seen frames to learn from."""
-    known = np.flatnonzero(seen)
-    if len(known) <= MOST_FRAMES:
-        return known
-    near = np.abs(times[known][:, None] - times[asked]).min(1) <= NEAR_S
-    room = max(MOST_FRAMES - near.sum(), MOST_FRAMES // 4)
-    stride = max(1, int(np.ceil((~near).sum() / room)))
-    return np.sort(np.concatenate([known[near], known[~near][::stride]]))

@@ -15,10 +15,11 @@ from scipy.linalg import cholesky, solve_triangular
 
 from gsac.avatar.wholebody import ARM, HANDS
 from gsac.stages.handgap.config import HandgapConfig
+from gsac.stages.handgap.gap_frames import pick_frames
 from gsac.stages.handgap.method import Detections, Filled, HiddenArm
 from gsac.stages.handgap.methods.gp import noise_px
 from gsac.stages.handgap.missing_hands import runs
-from gsac.stages.handgap.turning_body import TurningBody, predict_about_palm, within_reach
+from gsac.stages.handgap.turning_body import LIKELY, TurningBody, predict_about_palm, within_reach
 
 LENGTHS_S = (0.3, 0.45, 0.65, 1.0)
 """Grid of the rotations' time constant, s."""
@@ -40,10 +41,8 @@ RIDGE = 0.3
 """Regularises the usual pose where the body hardly turns, in frames."""
 HIPS = np.array((0, 0.5, 0))
 """Pivot of the trunk, in torsos from the body's centre."""
-LIKELY = 4.0
-"""Grid entries this far below the best log likelihood get no weight."""
-MOST_FRAMES, NEAR_S = 100, 1.5
-"""In a clip of more frames, a gap is filled from the seen frames within NEAR_S seconds and every n-th of the others."""
+MOST_FRAMES = 100
+"""In a clip of more frames each gap is filled by itself, from about so many (`pick_frames`)."""
 
 
 @dataclass
@@ -132,7 +131,8 @@ def predict(tracks: np.ndarray, shown: np.ndarray, asked: np.ndarray, body: Turn
         gaps = [asked & (np.arange(len(tracks)) >= a) & (np.arange(len(tracks)) < b)
                 for a, b in runs(asked.any(0)) if asked[:, a].any()]
     for gap in gaps:
-        use = pick_frames(gap.any(0), shown.any(0), body.times)
+        use = np.zeros(len(tracks), bool)
+        use[pick_frames((gap | shown).any(0), gap.any(0), body.times, MOST_FRAMES)] = True
         _predict_gap(tracks, shown & use, gap, usual, noise, body, place, spread)
     return place * body.torso, spread * body.torso
 
@@ -185,17 +185,3 @@ def fit_usual_place(track: np.ndarray, shown: np.ndarray, turn: np.ndarray) -> n
     waves = np.stack([np.cos(turn), np.sin(turn)], 1)[shown]
     x, z = np.linalg.solve(waves.T @ waves + RIDGE * np.eye(2), waves.T @ track[shown, 0])
     return np.array([x, track[shown, 1].mean(), z])
-
-
-def pick_frames(asked: np.ndarray, shown: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """asked, shown: (T,) bool; times: (T,) s. Returns (T,) bool: the frames to learn from."""
-    out = np.zeros(len(times), bool)
-    known = np.flatnonzero(shown | asked)
-    if len(times) <= MOST_FRAMES:
-        out[known] = True
-        return out
-    close = np.abs(times[known][:, None] - times[asked]).min(1) <= NEAR_S
-    room = max(MOST_FRAMES - close.sum(), MOST_FRAMES // 4)
-    stride = max(1, int(np.ceil((~close).sum() / room)))
-    out[known[close]] = out[known[~close][::stride]] = True
-    return out
