@@ -16,8 +16,8 @@ class Finish:
     def __init__(self, poses: Poses, trained: np.ndarray):
         """trained: (n,) indices of frames."""
         self.drift = remove_drift(poses, trained)
-        self.carried = joint_faces.bend(poses, trained)
-        self.seen = joint_strays.bend(poses, trained)
+        self.carried = joint_faces.bend_faces(poses, trained)
+        self.seen = joint_strays.bend_silhouettes(poses, trained)
 
     def __call__(self, gaussians: Gaussians) -> Gaussians:
         """The gaussians, of the poses as they were, as they are handed out."""

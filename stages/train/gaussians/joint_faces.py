@@ -21,22 +21,10 @@ from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.rotation import about_y
 from gsac.avatar.skinning import joint_transforms
 from gsac.avatar.threads import Share, Workspace, side_by_side
+from gsac.stages.train.gaussians.bends import BENDS, usual_pose
 from gsac.stages.train.gaussians.nearest import find_nearest
 from gsac.stages.train.poses.poses import Poses
 
-BENDS = (
-    {"elbow": (0, -115, 0)},
-    {"shoulder": (0, 0, 60), "collar": (0, 0, 15)},
-    {"shoulder": (0, -80, 0)},
-    {"shoulder": (0, 0, 0)},
-    {"shoulder": (-60, 0, 0), "elbow": (0, -100, 0)},
-    {"shoulder": (45, 0, -50), "elbow": (0, -100, 0)},
-    {"hip": (-100, 15, 12), "knee": (120, 0, 0), "spine1": (15, 0, 0)},
-    {"hip": (20, 0, 0), "knee": (115, 0, 0)},
-    {"hip": (0, 0, 30), "wrist": (0, 0, 50), "neck": (0, 40, 0), "ankle": (-30, 0, 0)},
-    {"wrist": (0, 0, -50), "neck": (25, 0, 0), "spine2": (20, 0, 0), "ankle": (30, 0, 0)},
-)
-"""What is bent in each sampled pose; the other joints stay as the clip has them."""
 SWING = 0.008
 """m, root mean square over the sampled poses, by which a gaussian may leave the surface that it lies on."""
 GAIN = 0.8
@@ -63,8 +51,8 @@ class Posed(NamedTuple):
     frames: FaceFrames
 
 
-class Bending(NamedTuple):
-    """The body in the clip's usual pose and with joints bent."""
+class BentFaces(NamedTuple):
+    """Joints and faces in the clip's usual pose and in its bends."""
 
     body: Body
     rest: np.ndarray
@@ -73,23 +61,22 @@ class Bending(NamedTuple):
     bent: list[Posed]
 
 
-def bend(poses: Poses, frames: np.ndarray) -> Bending:
-    """The body as `BENDS` have it. frames: (n,) trained ones, whose median pose is the usual one."""
+def bend_faces(poses: Poses, frames: np.ndarray) -> BentFaces:
+    """Joints and faces as `BENDS` have them. frames: (n,) trained ones, whose median pose is the usual one."""
     body, (rest, joints) = poses.body, poses.rest(int(frames[0]))
-    usual = np.median(poses.pose[frames], 0)
-    usual[0] = 0
+    usual = usual_pose(poses, frames)
 
     def carry(pose: np.ndarray, _: Workspace) -> Posed:
         return Posed(joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32),
                      face_frames(body.bend(rest, joints, pose), body.faces))
 
     posed, *bent = side_by_side(carry, [usual, *(turn_joints(usual, turns) for turns in BENDS)])
-    return Bending(body, rest, posed, bent)
+    return BentFaces(body, rest, posed, bent)
 
 
-def hold_at_joints(gaussians: Gaussians, bending: Bending) -> Gaussians:
+def hold_at_joints(gaussians: Gaussians, carried: BentFaces) -> Gaussians:
     """The gaussians where they are in the usual pose, some bound to the face that carries them best to the bent ones."""
-    body, rest, usual, bent = bending
+    body, rest, usual, bent = carried
     share, at = Workspace().share, usual.frames
     bound = bind(at, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     skinned = face_weights(body)

@@ -21,7 +21,7 @@ from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.config import FULL_SIZE
-from gsac.stages.train.gaussians.joint_faces import BENDS
+from gsac.stages.train.gaussians.bends import BENDS, usual_pose
 from gsac.stages.train.gaussians.unseen import find_heights
 from gsac.stages.train.judge.novel_poses import turn_before_camera
 from gsac.stages.train.poses.poses import Poses
@@ -67,8 +67,8 @@ class Bent(NamedTuple):
     sides: list[Side]
 
 
-class Bending(NamedTuple):
-    """The body in the clip's usual pose and with joints bent."""
+class BentSilhouettes(NamedTuple):
+    """The body's surface in the clip's usual pose, and how the body looks in its bends."""
 
     faces: np.ndarray
     """(F, 3)."""
@@ -76,17 +76,16 @@ class Bending(NamedTuple):
     bent: list[Bent]
 
 
-def bend(poses: Poses, frames: np.ndarray) -> Bending:
-    """The body as `BENDS` have it. frames: (n,) trained ones, whose median pose is the usual one."""
-    pose, faces = np.median(poses.pose[frames], 0), poses.body.faces
-    pose[0] = 0
+def bend_silhouettes(poses: Poses, frames: np.ndarray) -> BentSilhouettes:
+    """The silhouettes as `BENDS` have them. frames: (n,) trained ones, whose median pose is the usual one."""
+    pose, faces = usual_pose(poses, frames), poses.body.faces
     bent = side_by_side(lambda turns, _: see(put_in_pose(poses, int(frames[0]), turn_joints(pose, turns)), faces), BENDS)
-    return Bending(faces, place(put_in_pose(poses, int(frames[0]), pose), faces), bent)
+    return BentSilhouettes(faces, place(put_in_pose(poses, int(frames[0]), pose), faces), bent)
 
 
-def draw_in_strays(gaussians: Gaussians, bending: Bending) -> Gaussians:
+def draw_in_strays(gaussians: Gaussians, seen: BentSilhouettes) -> Gaussians:
     """The gaussians, some lower or smaller."""
-    faces, usual, left = bending
+    faces, usual, left = seen
     out = gaussians[np.arange(len(gaussians))]
     size, surface = np.maximum(usual.frames.k[gaussians.face], 1e-9), find_heights(gaussians, usual.frames)[1]
 

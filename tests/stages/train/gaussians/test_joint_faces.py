@@ -54,7 +54,7 @@ def test_a_gaussian_beside_its_face_follows_the_bent_elbow_and_stays_where_the_c
     plain = Gaussians.area(poses.rest(0)[0], body.faces, 3000)
     plain.light = np.tile([[0.7], [0.1], [0.2], [0.2]], 3).astype(np.float32)
     beside, which = put_beside(body, poses, plain)
-    held = joint_faces.hold_at_joints(beside, joint_faces.bend(poses, FRAMES))
+    held = joint_faces.hold_at_joints(beside, joint_faces.bend_faces(poses, FRAMES))
     usual, bent = {}, {"elbow": (0, -110, 0)}
     for before, after in zip(place(body, poses, beside, usual)[0], place(body, poses, held, usual)[0], strict=True):
         np.testing.assert_allclose(before, after, atol=2e-5)
@@ -70,7 +70,7 @@ def test_a_gaussian_beside_its_face_follows_the_bent_elbow_and_stays_where_the_c
 
 def test_gaussians_that_lie_on_their_faces_stay_as_they_are(body, poses):
     plain = Gaussians.area(poses.rest(0)[0], body.faces, 3000)
-    held = joint_faces.hold_at_joints(plain, joint_faces.bend(poses, FRAMES))
+    held = joint_faces.hold_at_joints(plain, joint_faces.bend_faces(poses, FRAMES))
     assert (held.face != plain.face).mean() < 0.01
 
 

@@ -9,7 +9,8 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import INDEX, turn_joints
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.gaussians import joint_strays
-from gsac.stages.train.gaussians.joint_faces import BENDS, bind_anew
+from gsac.stages.train.gaussians.bends import BENDS
+from gsac.stages.train.gaussians.joint_faces import bind_anew
 from gsac.stages.train.poses.poses import Poses
 
 FRAMES = np.arange(1)
@@ -58,8 +59,8 @@ def stray_elbow(poses, gaussians):
 
 def test_what_lies_flat_and_is_thrown_off_by_a_bent_elbow_shrinks_and_nothing_else_changes(poses, plain):
     thrown, which = carried_by_the_forearm(poses, plain)
-    bending = joint_strays.bend(poses, FRAMES)
-    held, anyway = joint_strays.draw_in_strays(thrown, bending), joint_strays.draw_in_strays(plain, bending)
+    seen = joint_strays.bend_silhouettes(poses, FRAMES)
+    held, anyway = joint_strays.draw_in_strays(thrown, seen), joint_strays.draw_in_strays(plain, seen)
     before, after = stray_elbow(poses, thrown), stray_elbow(poses, held)
     assert before[which].sum() > 2e-3
     assert after[which].sum() < 0.5 * before[which].sum()
@@ -83,13 +84,13 @@ def test_hair_that_stands_off_the_head_in_the_clip_stays(poses, plain):
     lifted.mu[hair, 1] += 0.08 / at.k[plain.face[hair]]
     usual = stray_of(lifted, poses, poses.pose[0])
     assert usual[hair].max() > 2 * joint_strays.LEAST
-    held = joint_strays.draw_in_strays(lifted, joint_strays.bend(poses, FRAMES))
+    held = joint_strays.draw_in_strays(lifted, joint_strays.bend_silhouettes(poses, FRAMES))
     assert (held.log_scale[hair] == lifted.log_scale[hair]).all(1).mean() > 0.95
 
 
 def test_fewer_gaussians_which_are_wider_are_left_in_peace(poses):
     few = Gaussians.area(poses.rest(0)[0], poses.body.faces, 700)
-    held = joint_strays.draw_in_strays(few, joint_strays.bend(poses, FRAMES))
+    held = joint_strays.draw_in_strays(few, joint_strays.bend_silhouettes(poses, FRAMES))
     assert (held.log_scale != few.log_scale).any(1).mean() < 0.05
 
 
@@ -101,7 +102,7 @@ def test_what_a_growing_armpit_lifts_off_the_body_is_lowered_to_the_surface_arou
     lifted = plain[np.arange(len(plain))]
     lifted.mu[armpit, 1] += 0.012 / at.k[plain.face[armpit]]
     lifted.log_scale[armpit] = np.log(0.004 / at.k[plain.face[armpit]])[:, None]
-    held = joint_strays.draw_in_strays(lifted, joint_strays.bend(poses, FRAMES))
+    held = joint_strays.draw_in_strays(lifted, joint_strays.bend_silhouettes(poses, FRAMES))
     before, after = stray_of(lifted, poses, pose), stray_of(held, poses, pose)
     moved = np.flatnonzero(held.mu[:, 1] < lifted.mu[:, 1])
     assert len(moved) > 3 and np.isin(moved, armpit).mean() > 0.7
