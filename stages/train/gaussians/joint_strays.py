@@ -23,8 +23,8 @@ from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.gaussians.bends import BENDS, usual_pose
 from gsac.stages.train.gaussians.unseen import find_heights
-from gsac.stages.train.judge.novel_poses import turn_before_camera
 from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.poses.turned_body import turn_before_camera
 
 TURNS = 3
 """Sides that each pose is looked at from."""

@@ -10,14 +10,13 @@ import cv2
 import numpy as np
 
 from gsac.avatar.binding import bind, face_frames
-from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import J, turn_joints
 from gsac.avatar.raster import render_bound
-from gsac.avatar.rotation import about_y
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.poses.turned_body import turn_before_camera
 
 POSES = {
     "T-pose": {},
@@ -32,8 +31,6 @@ POSES = {
 """Degrees, axis-angle, on top of the T-pose; a joint without a side is both, mirrored."""
 TURNS = (0, 90, 180, 270, 45)
 """Degrees about the upright axis of the views of each pose."""
-SIZE = 240
-"""px, side of these images."""
 OFF = 0.06
 """m that cloth and hair may stand off the body."""
 RIM = 0.015
@@ -76,16 +73,3 @@ def disc(radius: int) -> np.ndarray:
 def pose_body(poses: Poses, turns: dict[str, tuple[float, float, float]]) -> np.ndarray:
     """(V, 3) m, the canonical body with some joints turned, as `turn_joints` takes them."""
     return poses.body.bend(*poses.rest(0), turn_joints(np.zeros((J, 3)), turns))
-
-
-def turn_before_camera(vertices: np.ndarray, degrees: float) -> tuple[np.ndarray, Camera, float]:
-    """Turns the body, vertices (V, 3) m, about the upright axis before a camera that sees all of it.
-
-    Returns vertices (V, 3) m in the camera frame, the camera, and px for each m.
-    """
-    turn = about_y(np.radians(degrees))
-    middle = (vertices.min(0) + vertices.max(0)) / 2
-    half = float(np.linalg.norm(vertices - middle, axis=1).max())
-    placed = (vertices - middle) @ (np.diag([1.0, -1.0, -1.0]) @ turn).T + [0, 0, 6 * half]
-    focal = SIZE * 2.8
-    return placed.astype(np.float32), Camera((focal, focal), (SIZE / 2, SIZE / 2), SIZE, SIZE), focal / (6 * half)

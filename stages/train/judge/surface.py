@@ -8,8 +8,8 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.threads import side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
-from gsac.stages.train.judge.novel_poses import turn_before_camera
 from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.poses.turned_body import turn_before_camera
 from gsac.stages.train.views import View
 
 MOST = 24
