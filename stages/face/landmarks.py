@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.attention_mesh import AttentionMesh
 from gsac.avatar.facemesh import LEFT_EYE, LEFT_SIDE, POINTS, RIGHT_EYE, RIGHT_SIDE, Face, read_face, region_of
 from gsac.avatar.tflite import Network
+from gsac.stages.face.attention_mesh import AttentionMesh
 from gsac.stages.face.config import ATTENTIVE, PLAIN
 
 STABLE = np.array([168, 6, 197, 195, 5, 10, 151, 9, 8, RIGHT_EYE, 133, 362, LEFT_EYE, RIGHT_SIDE, LEFT_SIDE, 127, 356,

@@ -15,12 +15,12 @@ from gsac.avatar.blazepose import Pose
 from gsac.avatar.facemesh import Face
 from gsac.avatar.onnx_network import NetworkError
 from gsac.avatar.simcc import SimccNetwork, crop_matrix
-from gsac.avatar.simcc_scores import calibrate
 from gsac.avatar.wholebody import HANDS
 from gsac.stages.contract import BadInput
 from gsac.stages.keypoints.config import KeypointsConfig
 from gsac.stages.keypoints.detection import Frame
 from gsac.stages.keypoints.detector import Detector
+from gsac.stages.keypoints.simcc_scores import calibrate
 
 
 @contextmanager

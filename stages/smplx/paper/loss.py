@@ -11,10 +11,10 @@ import numpy as np
 import torch
 
 from gsac.avatar.body import Body
-from gsac.avatar.torch_body import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from gsac.avatar.wholebody import FACE, HANDS, INDEX
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.paper.head import EYES, Head, HeadTerms, faces_camera, select_head
+from gsac.stages.smplx.paper.torch_body import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from gsac.stages.smplx.prior import BODY_JOINTS
 from gsac.stages.smplx.sightings import Sightings
 from gsac.stages.smplx.state import State

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 from gsac.avatar import rotation
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.likeness import SIZES, average, compare_parts
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.yaw import name_side, yaw
 from gsac.stages.train.judge.heldout import find_boxes, render_view, truth
+from gsac.stages.train.judge.parts import SIZES, average, compare_parts
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import Views
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from gsac.avatar.torch_body import to_matrices
 from gsac.stages.smplx.initial import estimate_start
 from gsac.stages.smplx.paper.head import Head
 from gsac.stages.smplx.paper.loss import Objective, box_person
+from gsac.stages.smplx.paper.torch_body import to_matrices
 from support.turning_person import FOCAL, HEIGHT, WIDTH, facing_person, head_of, sightings_of
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,7 @@ import torch
 
 from gsac.avatar import rotation
 from gsac.avatar.body import Body, BodyParams
-from gsac.avatar.torch_body import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
+from gsac.stages.smplx.paper.torch_body import Kinematics, Mesh, Points, to_matrices, to_six, to_vectors
 from support.turning_person import facing_person
 
 pytestmark = pytest.mark.slow

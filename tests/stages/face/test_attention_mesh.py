@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsac.avatar.attention_mesh import SIDE, AttentionMesh, Part, sample, take_apart
 from gsac.avatar.network_files import ModelMissingError, model_path
+from gsac.stages.face.attention_mesh import SIDE, AttentionMesh, Part, sample, take_apart
 
 EYE = Part(np.array([0, 1, 2, 3]), (0, 1), 1.5)
 """Corners, upper and lower lid."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gsac.avatar.onnx_network import NetworkError
-from gsac.avatar.simcc_scores import calibrate
+from gsac.stages.keypoints.simcc_scores import calibrate
 
 
 @pytest.mark.parametrize("peaks", [0.19, 40.0, -2.0, np.nan])

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.likeness import SIZES, average, compare_parts
+from gsac.stages.train.judge.parts import SIZES, average, compare_parts
 
 
 def person(height, blur=0.0, shift=0):
