@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from gsac.pipeline.report.pictures import Footage
+from gsac.pipeline.report.pictures import RunPictures
 from gsac.pipeline.report.results import Results
 from gsac.pipeline.report.sheets import alpha_sheet
 from gsac.pipeline.report.verdict import NAMES, give_verdict
@@ -20,7 +20,7 @@ def row_of(run: Path) -> dict[str, Any]:
     """Figures of a run's folder and the verdict as it stands, to be set right by eye."""
     results = Results(run)
     metrics = {name: results.metrics.get(name) for name in FIGURES}
-    facts = {name: value for name, value in alpha_sheet(Footage(results)).facts.items() if name in FACTS}
+    facts = {name: value for name, value in alpha_sheet(RunPictures(results)).facts.items() if name in FACTS}
     given = give_verdict(metrics, facts)
     told = {part: next(p.grade.word for p in given.parts if p.name == name) for part, name in NAMES.items()}
     judged = {"whole": given.grade.word} | told

@@ -46,7 +46,7 @@ class Time:
 
 
 @dataclass(frozen=True)
-class Pace:
+class MachineSpeed:
     """How fast this machine is beside the one of the cost model."""
 
     took: float = 0.0
@@ -56,8 +56,8 @@ class Pace:
     waiting: float = 1.0
     """Wall over CPU time, relative to the model's, of the run that waited least: others may have had the machine in the rest."""
 
-    def __add__(self, other: Pace) -> Pace:
-        return Pace(self.took + other.took, self.modelled + other.modelled)
+    def __add__(self, other: MachineSpeed) -> MachineSpeed:
+        return MachineSpeed(self.took + other.took, self.modelled + other.modelled)
 
     def scale(self, time: Time) -> Time:
         """What the model says, as it would take here."""
@@ -121,7 +121,7 @@ class Forecaster:
 
     def __init__(self, keys: Keys, store: Store):
         self._keys, self._store, self._cores = keys, store, count_cores()
-        self._pace = functools.cache(lambda name: _pace(name, keys, store, self._cores))
+        self._speed = functools.cache(lambda name: _speed(name, keys, store, self._cores))
         self._last_time = functools.cache(lambda name: _last_time(name, store))
 
     def foretell(self, plans: Iterable[StagePlan], clip: Path) -> Forecast:
@@ -131,12 +131,12 @@ class Forecaster:
         split = next((plan.cached for plan in plans if plan.stage == SPLIT and plan.cached is not None), None)
         footage = _footage_of(split, self._store) or expect_footage(clip, keys.configs.get(SPLIT))
         models = {name: _model_time(name, keys.configs[name], footage, keys.device_of(name), self._cores) for name in due}
-        pace = {name: self._pace(name) for name in due}
-        overall = sum(pace.values(), Pace())
+        speeds = {name: self._speed(name) for name in due}
+        overall = sum(speeds.values(), MachineSpeed())
         stages, unknown, known_here = {}, [], bool(overall.modelled)
         for name in due:
             if (expected := models[name]) is not None:
-                stages[name] = (pace[name] if pace[name].modelled else overall).scale(expected)
+                stages[name] = (speeds[name] if speeds[name].modelled else overall).scale(expected)
             elif (usual := self._last_time(name)) is not None:
                 stages[name], known_here = usual, True
             else:
@@ -157,8 +157,8 @@ def _model_time(name: str, config: Any, footage: Footage, device: str, cores: in
     return None if cost is None else Time(cost.seconds(cores), cost.cpu_seconds)
 
 
-def _pace(name: str, keys: Keys, store: Store, cores: int) -> Pace:
-    """Of the stage's earlier runs on its device class."""
+def _speed(name: str, keys: Keys, store: Store, cores: int) -> MachineSpeed:
+    """By the stage's earlier runs on its device class."""
     took, modelled, waiting = 0.0, 0.0, []
     for age, record in enumerate(store.recent(name, EARLIER_RUNS)):
         footage = _footage_of(record, store)
@@ -172,7 +172,7 @@ def _pace(name: str, keys: Keys, store: Store, cores: int) -> Pace:
         if model is not None and 0 < cpu_seconds < float("inf"):
             took, modelled = took + FADING ** age * cpu_seconds, modelled + FADING ** age * model.cpu_seconds
             waiting.append(record.info.seconds / cpu_seconds * model.cpu_seconds / model.seconds)
-    return Pace(took, modelled, min(waiting, default=1.0))
+    return MachineSpeed(took, modelled, min(waiting, default=1.0))
 
 
 def _last_time(name: str, store: Store) -> Time | None:

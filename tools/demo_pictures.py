@@ -41,14 +41,14 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--run", type=Path, default=Path("demo/avatar"), metavar="DIR", help="default: demo/avatar")
     parser.add_argument("--out", type=Path, default=Path("docs"), metavar="DIR", help="default: docs")
     options = parser.parse_args(argv)
-    from gsac.pipeline.report.pictures import Footage
+    from gsac.pipeline.report.pictures import RunPictures
     from gsac.pipeline.report.results import Results
     from gsac.pipeline.report.sheets import body_sheet, contact_sheet, heldout_sheet
 
     results = Results(options.run)
-    footage = Footage(results)
-    save(options.out / "demo-clip.jpg", join_strip(contact_sheet(footage).pictures))
-    save(options.out / "demo-body.jpg", join_strip(body_sheet(footage).pictures))
+    run = RunPictures(results)
+    save(options.out / "demo-clip.jpg", join_strip(contact_sheet(run).pictures))
+    save(options.out / "demo-body.jpg", join_strip(body_sheet(run).pictures))
     held = heldout_sheet(results).pictures
     save(options.out / "demo-heldout.jpg", decode(held[len(held) // 2].uri))
     save(options.out / "demo-viewer.jpg", photograph(options.run / "export" / "viewer.html"))

@@ -135,9 +135,9 @@ class Painter:
 
     def __init__(self, results: Results):
         from gsac.pipeline.report import charts, sheets, turn
-        from gsac.pipeline.report.pictures import Footage
+        from gsac.pipeline.report.pictures import RunPictures
 
-        self.results, self.footage = results, Footage(results)
+        self.results, self.run = results, RunPictures(results)
         self.charts, self.sheets, self.turn = charts, sheets, turn
 
 
@@ -325,16 +325,16 @@ def size(value: Any) -> str:
 SECTIONS = (
     (AVATAR, "The avatar", "", "train/heldout/views.png", lambda paint: paint.turn.turn_sheet(paint.results)),
     ("clip", "The clip", "Frames that the stages read, evenly through the clip.", "split/frames",
-     lambda paint: paint.sheets.contact_sheet(paint.footage)),
+     lambda paint: paint.sheets.contact_sheet(paint.run)),
     ("keypoints", "Keypoints", "What the detector saw. A ring is a point filled by its neighbours in time; "
      "a cross marks the wrist of a hand that is missing.", "keypoints/keypoints.npz",
-     lambda paint: paint.sheets.keypoint_sheet(paint.footage),
-     lambda paint: [paint.charts.strip_chart(paint.footage.keypoints, paint.footage.face_valid)]),
+     lambda paint: paint.sheets.keypoint_sheet(paint.run),
+     lambda paint: [paint.charts.strip_chart(paint.run.keypoints, paint.run.face_valid)]),
     ("alpha", "Cut-out", "The person over magenta: what is pink inside the person, or not pink outside, is "
-     "wrong.", "segment/alpha", lambda paint: paint.sheets.alpha_sheet(paint.footage)),
+     "wrong.", "segment/alpha", lambda paint: paint.sheets.alpha_sheet(paint.run)),
     ("body", "Fitted body", "The body model over the frames, half transparent. Dots are detected points, "
      "white rings the body's own, lines their distance.", "smplx/body.npz",
-     lambda paint: paint.sheets.body_sheet(paint.footage)),
+     lambda paint: paint.sheets.body_sheet(paint.run)),
     ("heldout", "Held-out frames", "Truth, render and error (black none, yellow half of the full range) of "
      "frames that training never saw.", "train/heldout", lambda paint: paint.sheets.heldout_sheet(paint.results)),
     ("faces", "Faces", "Truth on the left, render on the right, of held-out frames, a pixel of the picture for each pixel of the "

@@ -103,7 +103,7 @@ def is_found(k: dict[str, np.ndarray]) -> np.ndarray:
     return (k["score"] >= SEEN) & ~k["filled"] if "filled" in k else k["score"] >= SEEN
 
 
-class Footage:
+class RunPictures:
     """Frames, masks and keypoints of one run, read once."""
 
     def __init__(self, results: Results):

@@ -19,8 +19,8 @@ from gsac.pipeline.report.pictures import (
     EXACT,
     QUALITIES,
     SEEN,
-    Footage,
     Picture,
+    RunPictures,
     is_found,
     make_picture,
     shrink_to_fit,
@@ -64,29 +64,29 @@ class Sheet:
     """Pictures side by side in each, of which the first is the truth and the second its render."""
 
 
-def contact_sheet(footage: Footage) -> Sheet:
+def contact_sheet(run: RunPictures) -> Sheet:
     """Frames of the clip."""
     pictures = []
-    for t in spread_evenly(len(footage.frames), CONTACT):
-        image = footage.frame(t)
+    for t in spread_evenly(len(run.frames), CONTACT):
+        image = run.frame(t)
         shown = shrink_to_fit(image, 480 if image.shape[1] > image.shape[0] else 300, 400)
-        pictures.append(make_picture(shown, footage.moment(t), f"Frame {t} of the clip", 24_000, t))
-    facts = {} if footage.clip.timestamps_s or len(footage.frames) == 1 else {"photos": float(len(footage.frames))}
+        pictures.append(make_picture(shown, run.moment(t), f"Frame {t} of the clip", 24_000, t))
+    facts = {} if run.clip.timestamps_s or len(run.frames) == 1 else {"photos": float(len(run.frames))}
     return Sheet(pictures, facts=facts, columns="large" if shown.shape[1] > shown.shape[0] else "small")
 
 
-def keypoint_sheet(footage: Footage) -> Sheet:
+def keypoint_sheet(run: RunPictures) -> Sheet:
     """Detected, filled and missing points over frames."""
-    k = footage.keypoints
-    count = min(len(footage.frames), len(k["xy"]))
-    crop = footage.crop(WIDE, HIGH)
+    k = run.keypoints
+    count = min(len(run.frames), len(k["xy"]))
+    crop = run.crop(WIDE, HIGH)
     pictures = []
     for t in choose_frames(k, count):
-        image = crop.cut(footage.frame(t)).copy()
+        image = crop.cut(run.frame(t)).copy()
         draw_keypoints(image, crop.points(k["xy"][t]), k["score"][t], SEEN, k.get("filled", [None] * count)[t],
                        k.get("missing", [None] * count)[t])
         hands = ", ".join(f"{side} hand {hand_state(k, t, i, side)}" for i, side in enumerate(HANDS))
-        pictures.append(make_picture(image, f"{footage.moment(t)}: {hands}", f"Keypoints of frame {t}", frame=t))
+        pictures.append(make_picture(image, f"{run.moment(t)}: {hands}", f"Keypoints of frame {t}", frame=t))
     figures = {"Detector": str(k["detector"]), "Of stage": "handgap" if "filled" in k else "keypoints",
                "Frames": str(len(k["xy"]))}
     person = np.any(is_found(k)[:, BODY], 1)
@@ -98,8 +98,8 @@ def keypoint_sheet(footage: Footage) -> Sheet:
         if "filled" in k:
             parts[f"{side}_hand_filled"] = f"{side.capitalize()} hand filled", k["filled"][:, part].any(1)
     parts["face_share"] = "Face found", is_part_seen(k, FACE)
-    if footage.face_valid is not None:
-        parts["face_used"] = "Face used for shape and expression", footage.face_valid
+    if run.face_valid is not None:
+        parts["face_used"] = "Face used for shape and expression", run.face_valid
     of = "" if person.all() else " of the frames with a person"
     for fact, (name, frames) in parts.items():
         facts[fact] = share_of(person, frames)
@@ -145,11 +145,11 @@ def choose_frames(k: dict[str, np.ndarray], count: int) -> list[int]:
     return sorted(frames)
 
 
-def alpha_sheet(footage: Footage) -> Sheet:
+def alpha_sheet(run: RunPictures) -> Sheet:
     """The person cut out, on magenta."""
-    crop = footage.crop(WIDE, HIGH)
-    masks = {p.stem for p in frame_paths(footage.results.path("segment/alpha"))}
-    lacking = np.array([path.stem not in masks for path in footage.frames])
+    crop = run.crop(WIDE, HIGH)
+    masks = {p.stem for p in frame_paths(run.results.path("segment/alpha"))}
+    lacking = np.array([path.stem not in masks for path in run.frames])
     if lacking.all():
         raise AbsentError("segment/alpha has no mask for any frame.")
     chosen = np.flatnonzero(~lacking)
@@ -158,21 +158,21 @@ def alpha_sheet(footage: Footage) -> Sheet:
     pictures, covers, soft, looks, views, cut = [], [], [], [], [], []
     for t in chosen:
         try:
-            alpha = footage.alpha(t)
+            alpha = run.alpha(t)
         except AbsentError:
             torn[t] = True
             continue
-        looks.append(measure_light(footage.frame(t), alpha))
-        views.append(make_view(footage.frame(t), alpha))
+        looks.append(measure_light(run.frame(t), alpha))
+        views.append(make_view(run.frame(t), alpha))
         cut.append(sides_touched(alpha))
         covers.append(float(alpha.mean()))
         soft.append(float(((alpha > 0.02) & (alpha < 0.98)).sum() / max((alpha >= 0.5).sum(), 1)))
-        pictures.append(make_picture(over_magenta(crop.cut(footage.frame(t)), crop.cut(alpha)),
-                                f"{footage.moment(t)}: covers {percent(covers[-1])}", f"Frame {t} cut out, on magenta", frame=t))
+        pictures.append(make_picture(over_magenta(crop.cut(run.frame(t)), crop.cut(alpha)),
+                                f"{run.moment(t)}: covers {percent(covers[-1])}", f"Frame {t} cut out, on magenta", frame=t))
     if not pictures:
         raise AbsentError("No mask of segment/alpha can be read.")
     empty = [t for t, cover in zip([t for t in chosen if not torn[t]], covers, strict=True) if cover < LEAST_MASK]
-    facts = {"empty_masks": float(footage.person_found[empty].sum())}
+    facts = {"empty_masks": float(run.person_found[empty].sum())}
     for name, values in zip(("brightness", "sharpness"), zip(*looks, strict=True), strict=True):
         if np.isfinite(values).any():
             facts[name] = float(np.nanmedian(values))
@@ -182,9 +182,9 @@ def alpha_sheet(footage: Footage) -> Sheet:
     if any(cut):
         counts = Counter(side for sides in cut for side in sides)
         figures["Person at the picture's edge"] = ", ".join(f"{side} in {n} of {len(cut)}" for side, n in counts.items())
-    if footage.clip.timestamps_s:
+    if run.clip.timestamps_s:
         sway = measure_sway(views)
-        facts["moved_frames"] = float(find_moved(sway, max(footage.clip.width, footage.clip.height)).sum())
+        facts["moved_frames"] = float(find_moved(sway, max(run.clip.width, run.clip.height)).sum())
         figures["Camera moved, among the frames shown"] = (
             f"{np.nanmax(sway):.0f} px" if np.isfinite(sway).any() else "not known: too plain a background")
     if lacking.any():
@@ -221,38 +221,38 @@ def measure_light(image: np.ndarray, alpha: np.ndarray) -> tuple[float, float]:
     return float(grey[inside].mean()), float(fine / max(coarse, 1e-9))
 
 
-def body_sheet(footage: Footage) -> Sheet:
+def body_sheet(run: RunPictures) -> Sheet:
     """The fitted body over frames, with reprojection errors."""
     from gsac.avatar.zbuffer import rasterise
 
-    params = BodyParams.read(footage.results.path("smplx/body.npz"))
+    params = BodyParams.read(run.results.path("smplx/body.npz"))
     body = Body.load()
     if params.model and params.model != body.digest:
         raise AbsentError(f"The body was fitted with a body model of your own ({params.model[:12]}), which this page does not "
                           "carry; it is drawn for the open body only.")
-    crop = footage.crop(WIDE, HIGH)
-    k = footage.keypoints
-    height, width = footage.frame(0).shape[:2]
+    crop = run.crop(WIDE, HIGH)
+    k = run.keypoints
+    height, width = run.frame(0).shape[:2]
     full = params.camera(width, height)
     camera = full.scaled(round(width * crop.scale), round(height * crop.scale))
-    frames = spread_evenly(min(len(footage.frames), params.frames, len(k["xy"])), BODIES)
-    fitted = footage.person_found[:params.frames] & ~params.lost[:len(footage.frames)]
+    frames = spread_evenly(min(len(run.frames), params.frames, len(k["xy"])), BODIES)
+    fitted = run.person_found[:params.frames] & ~params.lost[:len(run.frames)]
     pictures, overlaps, misses = [], [], [np.zeros(0)]
     for t in frames:
         vertices = body.posed(params, [t])[0][0]
         face_id = rasterise(vertices, body.faces, camera)[0]
-        small = cv2.resize(footage.frame(t), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+        small = cv2.resize(run.frame(t), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
         projected = full.project(body.keypoints(vertices))
         shown = (k["score"][t] >= SEEN) & np.isfinite(projected).all(1) & np.isfinite(k["xy"][t]).all(1)
         image = draw_body(small, vertices, body.faces, face_id)
         scale = np.array((camera.width / width, camera.height / height))
         draw_reprojection(image, k["xy"][t] * scale, projected * scale, shown)
-        caption = footage.moment(t)
+        caption = run.moment(t)
         if not fitted[t]:
-            caption += ": not fitted" if footage.person_found[t] else ": no person was found"
+            caption += ": not fitted" if run.person_found[t] else ": no person was found"
         else:
             misses.append(np.linalg.norm(k["xy"][t] - projected, axis=1)[: FEET.stop][shown[: FEET.stop]])
-            if (overlap := silhouette_iou(footage, t, face_id)) is not None:
+            if (overlap := silhouette_iou(run, t, face_id)) is not None:
                 overlaps.append(overlap)
                 caption += f": outline IoU {overlap:.2f}"
         x0, y0, x1, y1 = (round(v * crop.scale) for v in (crop.x0, crop.y0, crop.x1, crop.y1))
@@ -260,10 +260,10 @@ def body_sheet(footage: Footage) -> Sheet:
     return body_figures(Sheet(pictures), body, params, fitted, np.concatenate(misses), overlaps)
 
 
-def silhouette_iou(footage: Footage, t: int, face_id: np.ndarray) -> float | None:
+def silhouette_iou(run: RunPictures, t: int, face_id: np.ndarray) -> float | None:
     """Intersection over union of the drawn body and the mask at 0.5; None without a mask. face_id: (H, W), -1 where no face."""
     try:
-        alpha = footage.alpha(t)
+        alpha = run.alpha(t)
     except AbsentError:
         return None
     mask = cv2.resize(alpha, face_id.shape[::-1], interpolation=cv2.INTER_AREA) >= 0.5
