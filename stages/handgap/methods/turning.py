@@ -132,7 +132,7 @@ def predict(tracks: np.ndarray, shown: np.ndarray, asked: np.ndarray, body: Turn
                 for a, b in runs(asked.any(0)) if asked[:, a].any()]
     for gap in gaps:
         use = np.zeros(len(tracks), bool)
-        use[pick_frames((gap | shown).any(0), gap.any(0), body.times, MOST_FRAMES)] = True
+        use[pick_frames(np.any(gap | shown, axis=0), np.any(gap, axis=0), body.times, MOST_FRAMES)] = True
         _predict_gap(tracks, shown & use, gap, usual, noise, body, place, spread)
     return place * body.torso, spread * body.torso
 
