@@ -10,6 +10,9 @@ const MARGIN_WIDE = 0.58;
 
 // A press that moves less than this is a click, px.
 const STILL = 5;
+// A gesture walks round the person by so many degrees for each px of the page.
+const YAW_PER_PX = 0.35;
+const PITCH_PER_PX = 0.3;
 // The second of two clicks comes within this, ms, and lies nearer to the first than this, px.
 const TWICE_MS = 300;
 const TWICE_PX = 30;
@@ -114,16 +117,17 @@ export class OrbitCamera {
     });
   }
 
-  // Gestures by dx, dy in px of the page.
-  turn(dx, dy) {
-    this.yaw -= dx * 0.35;
-    this.pitch = Math.min(85, Math.max(-30, this.pitch + dy * 0.3));
+  // Walks round the person, degrees; pitch stays between a look from below and one from nearly above.
+  turnBy(yaw, pitch) {
+    this.yaw += yaw;
+    this.pitch = Math.min(85, Math.max(-30, this.pitch + pitch));
   }
 
   zoom(factor) {
     this.distance = Math.min(30, Math.max(0.35, this.distance * factor));
   }
 
+  // By dx, dy in px of the page.
   pan(dx, dy, height) {
     const step = this.distance / this.focal(height);
     for (let i = 0; i < 3; i++) this.target[i] -= step * (dx * this.view[i] + dy * this.view[4 + i]);
@@ -174,7 +178,7 @@ export class OrbitCamera {
       } else if (e.buttons & 6 || e.shiftKey) {
         this.pan(dx, dy, element.clientHeight);
       } else {
-        this.turn(dx, dy);
+        this.turnBy(-dx * YAW_PER_PX, dy * PITCH_PER_PX);
       }
       fingers.set(e.pointerId, [e.clientX, e.clientY]);
       this.moved = true;

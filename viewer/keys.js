@@ -13,7 +13,7 @@ export function keyActions(person) {
   const { viewer } = person, { camera } = viewer;
   const turn = (yaw, pitch) => () => {
     viewer.turntable = false;
-    camera.turn(-yaw / 0.35, pitch / 0.3);
+    camera.turnBy(yaw, pitch);
     camera.moved = true;
   };
   const zoom = (factor) => () => {
