@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from gsac.avatar.motion import quat
-from gsac.avatar.motion.source import LARGEST, MotionError, Source, most_frames, too_long
+from gsac.avatar.motion.source import LARGEST, MAX_BYTES, MotionError, Source, most_frames, too_long
 
-MAX_BYTES = 256 << 20
 MAX_LINE = 1 << 20
 """Characters."""
 MAX_JOINTS = 1000

@@ -17,12 +17,8 @@ from typing import Any
 import numpy as np
 
 from gsac.avatar.motion.places import place_nodes
-from gsac.avatar.motion.source import LARGEST, MotionError, Source, most_frames, too_long
+from gsac.avatar.motion.source import LARGEST, LONGEST_S, MAX_BYTES, RATE, MotionError, Source, most_frames, too_long
 
-MAX_BYTES = 256 << 20
-RATE = 30.0
-"""Frames a second at which the curves are sampled."""
-LONGEST_S = 3600
 TIMEOUT_S = 60
 MAX_MEMORY = 1 << 30
 """Of the process that reads the file, bytes."""

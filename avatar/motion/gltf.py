@@ -15,13 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.motion import quat
 from gsac.avatar.motion.places import place_nodes
-from gsac.avatar.motion.source import LARGEST, MotionError, Source, most_frames, too_long
+from gsac.avatar.motion.source import LARGEST, LONGEST_S, MAX_BYTES, RATE, MotionError, Source, most_frames, too_long
 
-MAX_BYTES = 256 << 20
 MAGIC = 0x46546C67
-RATE = 30.0
-"""Frames a second at which animations are sampled."""
-LONGEST_S = 3600
 MAX_JSON = 32 << 20
 MOST_NODES = 10_000
 MOST_NUMBERS = 32_000_000

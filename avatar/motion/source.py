@@ -12,6 +12,12 @@ from gsac.avatar.motion import quat
 
 LARGEST = 1e9
 """Upper limit of the numbers in a motion file: beyond it sums and products leave float32."""
+MAX_BYTES = 256 << 20
+"""Of a BVH, FBX or glTF file."""
+RATE = 30.0
+"""Frames a second at which curves are sampled, where a file holds these and no frames."""
+LONGEST_S = 3600
+"""Of a motion whose curves are sampled."""
 MOST = 4_000_000
 """Frames times joints, the file's or ours, that are read: more would fill the memory, however small the file is."""
 

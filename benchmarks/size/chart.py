@@ -6,10 +6,10 @@ from pathlib import Path
 
 import matplotlib
 
+from gsac.benchmarks.clip_colours import COLOURS
+
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
-
-COLOURS = ("#0b6e4f", "#b5532a", "#33508a", "#8a6d33", "#6a3d7a")
 
 
 def draw(curves: dict[str, list[dict]], scratch: dict[str, list[tuple[int, float]]], folder: Path) -> list[Path]:

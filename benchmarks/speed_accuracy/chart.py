@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
+from gsac.benchmarks.clip_colours import COLOURS
 from gsac.benchmarks.speed_accuracy.published import POINTS
 from gsac.benchmarks.speed_accuracy.table import groups
 from gsac.benchmarks.speed_accuracy.trial import Trial
@@ -16,7 +17,6 @@ import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.axes import Axes  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 
-COLOURS = ("#0b6e4f", "#b5532a", "#33508a", "#8a6d33", "#6a3d7a")
 MARKERS = {"draft": "^", "standard": "o", "fine": "s", "paper": "X"}
 QUALITIES = {"psnr_fg": "held-out PSNR on the person, as filmed, dB", "flip": "FLIP, held out, as filmed (less is better)"}
 TICKS = (20, 50, 100, 200, 500, 1000, 3000, 10_000, 50_000)

@@ -12,6 +12,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from gsac.avatar.zip_member import undated
 from gsac.cache.digest import tree_files
 from gsac.cache.half_made import half_made
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
@@ -22,8 +23,6 @@ from gsac.pipeline.run_folder import DAG, METRICS, PARAMS, REPORT, RunFolder
 from gsac.stages.contract import BadInput
 
 EXPORT, VIEWER, README = "export", "viewer.html", "README.txt"
-NEVER = (1980, 1, 1, 0, 0, 0)
-"""Date of every file in a zip, so that equal content gives equal bytes."""
 
 FIRST_PAGE = """<!doctype html>
 <meta charset="utf-8">
@@ -120,7 +119,7 @@ def write_zip(out: Path, name: str, members: dict[str, Path | str]) -> int:
     with half_made(out.parent) as (temp, _):
         with zipfile.ZipFile(temp / out.name, "w") as archive:
             for member, source in members.items():
-                info = zipfile.ZipInfo(f"{name}/{member}", NEVER)
+                info = undated(f"{name}/{member}")
                 info.compress_type, info.create_system, info.external_attr = zipfile.ZIP_DEFLATED, 3, 0o644 << 16
                 if isinstance(source, str):
                     archive.writestr(info, source)

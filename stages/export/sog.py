@@ -13,6 +13,7 @@ import zipfile
 
 import numpy as np
 
+from gsac.avatar.zip_member import undated
 from gsac.stages.export.ply import MIN_SCALE, SH0, turn_about_x
 
 VERSION = 2
@@ -23,8 +24,6 @@ LARGEST = 252
 """Alpha of a rotation whose first component, of wxyz, is the largest."""
 CELL_BITS = 10
 """Of each coordinate, for the order of the gaussians."""
-NEVER = (1980, 1, 1, 0, 0, 0)
-"""Date of every file in a zip, so that equal content gives equal bytes."""
 
 
 def sog_bytes(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, rgb: np.ndarray, opacity: np.ndarray) -> bytes:
@@ -54,7 +53,7 @@ def sog_bytes(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, rgb: np.
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for name, content in (("meta.json", json.dumps(meta).encode()), *((n, _webp(p)) for n, p in pictures.items())):
-            archive.writestr(zipfile.ZipInfo(name, NEVER), content)
+            archive.writestr(undated(name), content)
     return file.getvalue()
 
 

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.rotation import to_wxyz
+from gsac.avatar.zip_member import undated
 from gsac.stages.export.texture import Surface
 
 LAYER, PICTURE = "avatar.usda", "body.jpg"
@@ -22,8 +23,6 @@ ALIGNED = 64
 """Bytes; a reader maps the zip's files into memory as they are."""
 HEADER = 30
 """Bytes of a zip's head of a file, before its name and extra field."""
-NEVER = (1980, 1, 1, 0, 0, 0)
-"""Date of every file in a zip, so that equal content gives equal bytes."""
 PADDING = 0x1986
 """Id of the extra field that holds nothing, which USD's own writer uses."""
 
@@ -131,7 +130,7 @@ def usdz_bytes(avatar: RiggedAvatar, surface: Surface) -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         for name, content in ((LAYER, layer_text(avatar, surface).encode()), (PICTURE, surface.jpeg)):
-            info = zipfile.ZipInfo(name, NEVER)
+            info = undated(name)
             start = file.tell() + HEADER + len(name.encode()) + 4
             gap = -start % ALIGNED
             info.extra = PADDING.to_bytes(2, "little") + gap.to_bytes(2, "little") + b"\0" * gap

@@ -9,10 +9,9 @@ from gsac.avatar import rotation
 from gsac.avatar.body import Body
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx.prior import BODY_JOINTS, MEAN
-from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.sightings import TRUNK, Sightings
 from gsac.stages.smplx.state import State
 
-TRUNK = [INDEX[n] for n in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
 TURNING = TRUNK + [INDEX[n] for n in ("nose", "left_ear", "right_ear")]
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """Canonical to camera axes of a person who stands upright and faces the camera."""

@@ -17,6 +17,7 @@ BODY_POINTS = np.array([*range(23), *HAND_ROOTS])
 HIPS = (INDEX["left_hip"], INDEX["right_hip"])
 HEAD, FEET = slice(0, 5), slice(15, 23)
 TRUNK = [INDEX[name] for name in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
+"""Shoulders and hips, left before right."""
 TRUNKS = 3.5
 """Height of a person over the trunk from shoulders to hips, as the detector sees both: 3.4 to 3.6 in seven clips."""
 FOCAL_GUESS = 0.95

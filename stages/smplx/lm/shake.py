@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx import prior
-from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.sightings import TRUNK, Sightings
 
-TRUNK = [INDEX[name] for name in ("left_shoulder", "right_shoulder", "left_hip", "right_hip")]
 USUAL = 4.0
 """Factor on the prior's spread up to which accelerations are those of a person who turns on the spot."""
 NOISE = 0.012

@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.stages.findings import runs_of_frames
-from gsac.stages.smplx.initial import TRUNK
-from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.sightings import TRUNK, Sightings
 
 JUMP = np.radians(60)
 """Cost of a change between right and swapped, in turn: people who turn fast on film with few frames turn by 45 degrees a frame."""

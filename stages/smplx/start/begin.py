@@ -9,10 +9,10 @@ import numpy as np
 from gsac.avatar.body import Body
 from gsac.avatar.pose_files.read import Start
 from gsac.stages.findings import Code, Finding
-from gsac.stages.smplx.initial import TRUNK, estimate_start, fill_gaps, solve_transl
+from gsac.stages.smplx.initial import estimate_start, fill_gaps, solve_transl
 from gsac.stages.smplx.jacobians import Skeleton, make_pairs, place_points
 from gsac.stages.smplx.prior import BODY_JOINTS
-from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.sightings import TRUNK, Sightings
 from gsac.stages.smplx.state import State
 
 POINTS = np.arange(17)

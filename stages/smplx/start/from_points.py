@@ -9,7 +9,8 @@ from gsac.avatar.body import Body
 from gsac.avatar.joints import BODY, J
 from gsac.avatar.joints import INDEX as JOINT
 from gsac.avatar.wholebody import INDEX
-from gsac.stages.smplx.initial import TRUNK, hang_arms
+from gsac.stages.smplx.initial import hang_arms
+from gsac.stages.smplx.sightings import TRUNK
 
 LIMBS = {"left_hip": ("left_knee", "left_ankle", (1, 0, 0)), "right_hip": ("right_knee", "right_ankle", (1, 0, 0)),
          "left_shoulder": ("left_elbow", "left_wrist", (0, -1, 0)), "right_shoulder": ("right_elbow", "right_wrist", (0, 1, 0))}

@@ -12,8 +12,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.instant_hmr import InstantHmr, to_wholebody
 from gsac.avatar.joints import J
 from gsac.avatar.pose_files.read import Start
-from gsac.stages.smplx.initial import TRUNK
-from gsac.stages.smplx.sightings import Sightings
+from gsac.stages.smplx.sightings import TRUNK, Sightings
 from gsac.stages.smplx.silhouette import Outline
 from gsac.stages.smplx.start.from_points import turn_to_points
 

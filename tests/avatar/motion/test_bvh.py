@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar.motion import source as motion_source
-from gsac.avatar.motion.bvh import MAX_BYTES, read_bvh
-from gsac.avatar.motion.source import MotionError
+from gsac.avatar.motion.bvh import read_bvh
+from gsac.avatar.motion.source import MAX_BYTES, MotionError
 from support import dances
 
 SMALL = """HIERARCHY
