@@ -10,7 +10,7 @@ from gsac.cache.bundle import LINEAGE, BundleError, papers_of, read_bundle, writ
 from gsac.cache.lease import in_use
 from gsac.cache.record import Record
 from gsac.cache.store import Store
-from gsac.pipeline.commands.cache import format_size
+from gsac.pipeline.byte_size import format_size
 from gsac.pipeline.commands.options import add_force, add_json, answer_reporter, open_store, open_store_of, require_free
 from gsac.pipeline.errors import NotUpToDateError
 from gsac.pipeline.graph import CLIP

@@ -13,6 +13,7 @@ from gsac.cache.errors import CacheFolderError
 from gsac.cache.key import KeyParts
 from gsac.cache.roots import find_roots
 from gsac.cache.store import Store
+from gsac.pipeline.byte_size import format_size
 from gsac.pipeline.commands.options import add_json, answer_reporter, find_store, open_store, progress_reporter
 from gsac.pipeline.commands.shared_cache import declare_pull, declare_push, require_results
 from gsac.pipeline.json_output import emit
@@ -156,15 +157,6 @@ def describe_places(folders: list[RunFolder]) -> str:
         return "-"
     more = f" and {len(folders) - 1} more" if len(folders) > 1 else ""
     return f"{folders[0].clip_name}  {folders[0].root}{more}"
-
-
-def format_size(count: float) -> str:
-    """`1.2 MB`"""
-    for unit in ("B", "kB", "MB", "GB"):
-        if count < 1000:
-            return f"{count:.0f} {unit}" if unit == "B" else f"{count:.1f} {unit}"
-        count /= 1000
-    return f"{count:.1f} TB"
 
 
 def parse_size(text: str) -> int:

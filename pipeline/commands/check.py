@@ -7,9 +7,9 @@ import contextlib
 from pathlib import Path
 
 from gsac.cache.half_made import half_made, temporary_folder
+from gsac.pipeline.asked_clip import find_clip
 from gsac.pipeline.clip_check import LAST, PARAMS, check_clip
 from gsac.pipeline.commands.options import add_clip, add_json, answer_reporter, open_store, progress_reporter
-from gsac.pipeline.commands.run import find_clip
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.own_store import writable_store

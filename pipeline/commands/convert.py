@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import get_args
 
 from gsac.cache.half_made import half_made
+from gsac.pipeline.avatar_file import EXPORT, find_avatar, folder_around, name_avatar, refuse_footage
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
-from gsac.pipeline.commands.render import EXPORT, find_avatar, folder_around, name_avatar, refuse_footage
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode, Outcome
 from gsac.stages.contract import BadInput, did_you_mean

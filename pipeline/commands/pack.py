@@ -15,6 +15,7 @@ from urllib.parse import unquote, urlsplit
 from gsac.avatar.zip_member import undated
 from gsac.cache.digest import tree_files
 from gsac.cache.half_made import half_made
+from gsac.pipeline.avatar_file import EXPORT
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.lost_files import recovery, require_files
@@ -22,7 +23,7 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.run_folder import DAG, METRICS, PARAMS, REPORT, RunFolder
 from gsac.stages.contract import BadInput
 
-EXPORT, VIEWER, README = "export", "viewer.html", "README.txt"
+VIEWER, README = "viewer.html", "README.txt"
 
 FIRST_PAGE = """<!doctype html>
 <meta charset="utf-8">

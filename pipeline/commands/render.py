@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING
 
 from gsac.avatar.video import ENCODERS, TRANSPARENT
 from gsac.cache.half_made import half_made
+from gsac.pipeline.avatar_file import EXPORT, find_avatar, folder_around, name_avatar, refuse_footage
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
 from gsac.pipeline.journal import Journal
 from gsac.pipeline.json_output import emit
-from gsac.pipeline.lost_files import require_file
 from gsac.pipeline.outcomes import ExitCode, Outcome
-from gsac.pipeline.run_folder import RunFolder
 from gsac.stages.contract import BadInput, StageError, did_you_mean
 
 if TYPE_CHECKING:
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.avatar.motion.source import Motion
 
-EXPORT, FILE = "export", "avatar.gsac"
 FILMS = tuple(ENCODERS)
 """Suffixes of --out; without one it is a folder of pictures."""
 HEIGHT, WIDTHS = 960, (720, 1280)
@@ -162,41 +160,9 @@ def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
     return Motion(clip.fps, rotation, clip.transl[closed])
 
 
-def find_avatar(path: Path) -> Path:
-    """The .gsac file itself, or the one in a run's or an export folder. BadInput where there is none, or a link that leads to
-    nothing."""
-    if path.is_file():
-        return path
-    for folder in (path / EXPORT, path):
-        if (folder / FILE).is_file():
-            return folder / FILE
-        require_file(folder / FILE)
-    require_file(path)
-    raise BadInput(f"{path}: no {FILE} here; give the file, or the folder of a run whose stage export is done")
-
-
 def default_name(file: Path, motion: str | None) -> str:
     """`<avatar>-turn.mp4` or `<avatar>-<motion>.mp4`. file: the avatar.gsac; motion: a file's path or a clip's name."""
     return f"{name_avatar(file)}-{Path(motion).stem if motion else 'turn'}.mp4"
-
-
-def name_avatar(file: Path) -> str:
-    """The avatar's name: that of the run's folder, or where its file lies alone the file's own."""
-    folder = file.absolute().parent
-    return folder.parent.name if folder.name == EXPORT else file.stem
-
-
-def folder_around(file: Path) -> RunFolder:
-    """The folder of the run whose stage export wrote the avatar `file`, if it was one."""
-    return RunFolder(file.absolute().parent.parent)
-
-
-def refuse_footage(out: Path, file: Path) -> None:
-    """BadInput where the video would take the place of the clip, or of a photo of it, that the avatar was made from."""
-    folder = folder_around(file)
-    clip = folder.clip.resolve()
-    if out.exists() and clip.exists() and (clip.samefile(out) or clip in out.resolve().parents):
-        raise BadInput(f"{out} is the clip that {folder.root} was made from, which is never written over; give another --out")
 
 
 def parse_size(words: str) -> tuple[int, int]:

@@ -7,6 +7,7 @@ import os
 import shlex
 from pathlib import Path
 
+from gsac.pipeline.asked_clip import find_clip, run_folder_here
 from gsac.pipeline.clip_work import ClipWork
 from gsac.pipeline.closing import closing_lines
 from gsac.pipeline.commands.options import (
@@ -29,7 +30,7 @@ from gsac.pipeline.quality import STANDARD, find_quality, name_of, quality_entry
 from gsac.pipeline.reporter import PlainReporter
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run import ClipRun, Options
-from gsac.pipeline.run_folder import DAG, RUN, RunFolder, avatar_name
+from gsac.pipeline.run_folder import RUN, RunFolder, avatar_name
 from gsac.stages.contract import BadInput
 
 
@@ -109,25 +110,6 @@ def own_quality(run_folder: RunFolder, asked: str | None) -> str:
         raise BadInput(f"--quality {asked}: the run in this folder has parameters of its own, of {own}; `{command}` replaces them, "
                        "--set changes one")
     return own
-
-
-def run_folder_here() -> RunFolder:
-    """The folder of a run that the command was typed in. BadInput where it was typed elsewhere."""
-    here = Path.cwd()
-    try:
-        return RunFolder.around(here)
-    except BadInput as error:
-        raise BadInput(f"no CLIP was given, and this folder is not a run's: no {DAG} in {here} or above; give a video or a "
-                       "folder of photos") from error
-
-
-def find_clip(path: Path | None) -> Path:
-    """Absolute path of the clip; None: the clip of the run that the command was typed in. BadInput where there is none."""
-    if path is None:
-        return run_folder_here().require_clip()
-    if not path.exists():
-        raise BadInput(f"{path}: no such file or folder; give a video or a folder of photos")
-    return path.resolve()
 
 
 def default_out(clip: Path) -> Path:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gsac.pipeline.commands.run import find_clip
+from gsac.pipeline.asked_clip import find_clip
 
 
 def test_until_stops_after_a_stage_and_runs_only_what_it_needs(toy):
