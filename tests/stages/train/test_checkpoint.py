@@ -45,7 +45,8 @@ GROWS_SOON = {"paper.densify.FIRST": 1, "paper.densify.EVERY": 4, "paper.densify
 @pytest.mark.parametrize("values, stop, constants", [
     ({"steps": 40, "exposure": True}, 14, {}), ({"steps": 60}, 56, {}), ({"steps": 30, "gaussians": "auto"}, 30, FEW),
     ({"recipe": "paper", "steps": 12}, 9, GROWS_SOON)],
-    ids=["fast, while the surface moves", "fast, while steps are averaged", "fast, before the size search", "paper, after it has grown"])
+    ids=["fast, while the surface moves", "fast, while steps are averaged", "fast, before the size search",
+         "paper, after it has grown"])
 def test_a_training_that_was_killed_and_goes_on_gives_the_bytes_of_an_unbroken_one(job, tmp_path, monkeypatch, values, stop,
                                                                                   constants):
     for name, value in constants.items():
