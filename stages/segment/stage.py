@@ -35,6 +35,8 @@ from gsac.stages.segment.plate_from_video import learn_plate, relearn_plate
 
 METHODS: dict[Method, Callable[[dict[str, Path]], PersonMask]] = {"pose": PoseMask, "selfie": SelfieMask, "sapiens": Sapiens}
 """segment.method -> its class, made from the model files."""
+PLATE = "plate.png"
+"""The empty scene, beside the frames."""
 LABELS = "labels"
 """Folder of the alpha that holds a network's labels."""
 WIDE = 0.25
@@ -73,6 +75,18 @@ class Cutout(NamedTuple):
         return whole
 
 
+class Masked(NamedTuple):
+    """What the network says of a frame."""
+
+    t: int
+    image: np.ndarray
+    """(H, W, 3) uint8."""
+    probability: np.ndarray | None = None
+    """(H, W) of the person; None: the frame shows nobody."""
+    labels: np.ndarray | None = None
+    """(H, W), of a network that names the parts of the body."""
+
+
 def run(job: Job) -> None:
     frames = job.inputs["split/frames"]
     paths = frame_paths(frames)
@@ -85,7 +99,7 @@ def run(job: Job) -> None:
         if (frames / MASKS).is_dir():
             job.note("Masks lie beside the footage and are not used; segment.method=brought takes them.")
         try:
-            sway = cut_frames(job, paths, keypoints, clip)
+            sway = Cutting(job, paths, keypoints, clip).run()
         except NetworkError as e:
             raise BadInput(str(e)) from e
     moved = find_moved(sway, max(clip.width, clip.height))
@@ -129,81 +143,102 @@ def count_views(job: Job, views: Iterable[View], total: int) -> Iterator[View]:
         yield view
 
 
-def cut_frames(job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], clip: Clip) -> np.ndarray:
-    """Finds the person in each frame and writes the masks. paths: T frames; keypoints: their arrays (T, ...) by name. Returns (T,)
-    px, how far the camera sways."""
-    frames = job.inputs["split/frames"]
-    network = METHODS[job.config.method](job.models)
-    sapiens = network if isinstance(network, Sapiens) else None
-    regions = {t: region for t, (xy, score) in enumerate(zip(keypoints["xy"], keypoints["score"], strict=True))
-               if (region := person_region(np.nan_to_num(xy), score)) is not None}
-    found: dict[int, np.ndarray] = {}
+class Cutting:
+    """Finds the person in each frame of a clip and writes the masks."""
 
-    def look(t: int, image: np.ndarray) -> np.ndarray:
-        """Frame t's probability, (H, W); kept for `masks`, which asks for it again."""
-        found[t] = network(image, regions[t])
-        return found[t]
+    def __init__(self, job: Job, paths: list[Path], keypoints: dict[str, np.ndarray], clip: Clip):
+        """paths: T frames; keypoints: their arrays (T, ...) by name."""
+        self.job, self.paths, self.keypoints, self.clip = job, paths, keypoints, clip
+        self.network = METHODS[job.config.method](job.models)
+        self.sapiens = self.network if isinstance(self.network, Sapiens) else None
+        self.regions = {t: region for t, (xy, score) in enumerate(zip(keypoints["xy"], keypoints["score"], strict=True))
+                        if (region := person_region(np.nan_to_num(xy), score)) is not None}
+        """Frame -> where the network looks; frames without a person have none."""
+        self.found: dict[int, np.ndarray] = {}
+        """Frame -> probability (H, W) that the network has told already."""
+        self.cutouts: dict[int, Cutout] = {}
+        self.absent, self.unfound, self.fits = np.zeros((3, len(paths)), bool)
+        """(T,) each: nobody in the mask; nobody though points of a person are there; the plate fits the frame."""
+        self.given = (job.inputs["split/frames"] / PLATE).exists()
+        self.learns = job.config.use_plate and clip.timestamps_s is not None and not self.given
+        self.plate = self.first_plate()
 
-    plate, given = None, (frames / "plate.png").exists()
-    learns = job.config.use_plate and clip.timestamps_s is not None and not given
-    if job.config.use_plate and given:
-        image = read_frame(frames / "plate.png")
-        plate = Plate(image, np.ones(image.shape[:2], bool))
-    elif learns and sapiens is None:
-        plate = learn_plate(paths, np.isin(np.arange(len(paths)), list(regions)), lambda t, image: look(t, image) > LEAST)
-    absent, unfound, fits = np.zeros((3, len(paths)), bool)
-    cutouts: dict[int, Cutout] = {}
+    def run(self) -> np.ndarray:
+        """Returns (T,) px, how far the camera sways."""
+        if self.sapiens is not None:
+            prepare_labels(self.job.out, self.paths, (self.clip.height, self.clip.width))
+        with ThreadPoolExecutor(available_cores()) as pool:
+            views = prefetch(pool, self.cut, self.read_masks(pool), available_cores())
+            sway = measure_sway(count_views(self.job, views, len(self.paths)))
+            if self.absent.all():
+                raise StageError(describe_nobody(self.paths, self.unfound))
+            if self.learns:
+                still = self.stood_still(sway)
+                self.plate = relearn_plate(self.paths, ~self.absent, self.outline) if still else None
+            deque(pool.map(self.write_soft, range(len(self.paths))), maxlen=0)
+        warn_of_empty(self.job, self.absent, self.keypoints["score"])
+        other_scene = ~self.fits & ~self.absent
+        if self.given and other_scene.any():
+            self.job.warn(Finding.of(Code.OTHER_SCENE, other_scene))
+        return sway
 
-    def masks(pool: ThreadPoolExecutor) -> Iterator[tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]]:
-        """Index, image, probability and labels of each frame; the network has threads of its own, so one thread feeds it."""
-        for t, image in enumerate(prefetch(pool, read_frame, paths, 2)):
-            if t not in regions:
-                yield t, image, None, None
-            elif sapiens is not None:
-                yield t, image, *sapiens.read(image)
+    def first_plate(self) -> Plate | None:
+        """The empty scene that came with the footage, or what the network's first look at a video leaves of it."""
+        if self.job.config.use_plate and self.given:
+            image = read_frame(self.job.inputs["split/frames"] / PLATE)
+            return Plate(image, np.ones(image.shape[:2], bool))
+        if self.learns and self.sapiens is None:
+            shown = np.isin(np.arange(len(self.paths)), list(self.regions))
+            return learn_plate(self.paths, shown, lambda t, image: self.look(t, image) > LEAST)
+        return None
+
+    def look(self, t: int, image: np.ndarray) -> np.ndarray:
+        """Frame t's probability, (H, W); kept for `read_masks`, which asks for it again. image: (H, W, 3) uint8."""
+        self.found[t] = self.network(image, self.regions[t])
+        return self.found[t]
+
+    def read_masks(self, pool: ThreadPoolExecutor) -> Iterator[Masked]:
+        """What the network says of each frame; it has threads of its own, so one thread feeds it."""
+        for t, image in enumerate(prefetch(pool, read_frame, self.paths, 2)):
+            if t not in self.regions:
+                yield Masked(t, image)
+            elif self.sapiens is not None:
+                yield Masked(t, image, *self.sapiens.read(image))
             else:
-                probability = found.pop(t, None)
-                yield t, image, look(t, image) if probability is None else probability, None
+                probability = self.found.pop(t, None)
+                yield Masked(t, image, self.look(t, image) if probability is None else probability)
 
-    def cut(masked: tuple[int, np.ndarray, np.ndarray | None, np.ndarray | None]) -> View:
+    def cut(self, masked: Masked) -> View:
+        """Cuts the person out of a frame. Returns its scene, by which the camera's sway is measured."""
         t, image, probability, labels = masked
-        absent[t] = probability is None
+        self.absent[t] = probability is None
         if probability is None:
             return make_view(image, np.zeros(image.shape[:2], np.float32))
-        xy, score = np.nan_to_num(keypoints["xy"][t]), keypoints["score"][t]
+        xy, score = np.nan_to_num(self.keypoints["xy"][t]), self.keypoints["score"][t]
         if labels is None:
-            cutouts[t], fits[t] = cut_frame(image, probability, xy, score, plate, job.config.iterations)
+            self.cutouts[t], self.fits[t] = cut_frame(image, probability, xy, score, self.plate, self.job.config.iterations)
         else:
-            cutouts[t], fits[t] = cut_soft_frame(image, probability, xy, score, plate)
-            write_image(labels_of(job.out, paths[t]), keep_labels(labels, cutouts[t]))
-        if not cutouts[t].outline.any():
-            absent[t] = unfound[t] = True
-        return make_view(image, cutouts[t].on_frame(image.shape).astype(np.float32))
+            self.cutouts[t], self.fits[t] = cut_soft_frame(image, probability, xy, score, self.plate)
+            write_image(labels_of(self.job.out, self.paths[t]), keep_labels(labels, self.cutouts[t]))
+        if not self.cutouts[t].outline.any():
+            self.absent[t] = self.unfound[t] = True
+        return make_view(image, self.outline(t, image).astype(np.float32))
 
-    def outline(t: int, image: np.ndarray) -> np.ndarray:
-        return cutouts[t].on_frame(image.shape)
+    def outline(self, t: int, image: np.ndarray) -> np.ndarray:
+        """(H, W) bool. image: (H, W, 3), frame t."""
+        return self.cutouts[t].on_frame(image.shape)
 
-    def soft(t: int) -> None:
-        shape = clip.height, clip.width
-        alpha = np.zeros(shape, np.float32) if absent[t] else finish(cutouts.pop(t), shape, plate)
-        write_alpha(job.out / "alpha" / f"{paths[t].stem}.exr", alpha)
+    def stood_still(self, sway: np.ndarray) -> bool:
+        """Whether the camera did, so that a plate can be learned from the outlines. sway: (T,) px."""
+        if self.sapiens is not None:
+            return not find_moved(sway, max(self.clip.width, self.clip.height)).any()
+        return self.plate is not None and bool(self.fits[~self.absent].mean() >= MOSTLY)
 
-    if sapiens is not None:
-        prepare_labels(job.out, paths, (clip.height, clip.width))
-    with ThreadPoolExecutor(available_cores()) as pool:
-        sway = measure_sway(count_views(job, prefetch(pool, cut, masks(pool), available_cores()), len(paths)))
-        if absent.all():
-            raise StageError(describe_nobody(paths, unfound))
-        if learns:
-            still = not find_moved(sway, max(clip.width, clip.height)).any() if sapiens is not None else (
-                plate is not None and fits[~absent].mean() >= MOSTLY)
-            plate = relearn_plate(paths, ~absent, outline) if still else None
-        deque(pool.map(soft, range(len(paths))), maxlen=0)
-    warn_of_empty(job, absent, keypoints["score"])
-    other_scene = ~fits & ~absent
-    if given and other_scene.any():
-        job.warn(Finding.of(Code.OTHER_SCENE, other_scene))
-    return sway
+    def write_soft(self, t: int) -> None:
+        """Writes frame t's alpha with its soft edge."""
+        shape = self.clip.height, self.clip.width
+        alpha = np.zeros(shape, np.float32) if self.absent[t] else finish(self.cutouts.pop(t), shape, self.plate)
+        write_alpha(self.job.out / "alpha" / f"{self.paths[t].stem}.exr", alpha)
 
 
 def labels_of(out: Path, frame: Path) -> Path:
