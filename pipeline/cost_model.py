@@ -1,7 +1,7 @@
 """What a stage costs, by frames, pixels, steps and gaussians, on the machine that the coefficients were measured on.
 
-That is a server of two cores without a GPU: whole runs in draft and standard, and runs up to the body fit, of clips of 7 to 120
-frames, by `gsac bench forecast`; and for training on a GPU an H100. How much faster or slower another machine is, its
+That is a server of two cores without a GPU: whole runs in draft and standard of clips of 7 to 65 frames, by `gsac bench
+forecast`; and for training on a GPU an H100. How much faster or slower another machine is, its
 own runs tell: `pipeline.cost_forecast`.
 """
 
@@ -100,14 +100,14 @@ def _once(config: Any, footage: Footage) -> tuple[float, ...]:
 
 
 MODELS = {
-    ("split", "cpu"): Model(_split, (0.65, 0.04), 0.1),
-    ("keypoints", "cpu"): Model(_keypoints, (0.5, 0.1, 0.013), 0.07),
-    ("handgap", "cpu"): Model(_frames, (0.19, 0.0039), 0.0),
-    ("segment", "cpu"): Model(_segment, (0.6, 0.11, 0.035, 0.018), 0.05),
-    ("face", "cpu"): Model(_frames, (0.58, 0.011), 0.1),
-    ("smplx", "cpu"): Model(_smplx, (1.7, 0.013, 0.0008), 0.45),
-    ("train", "cpu"): Model(_train("cpu"), (2.3, 0.09, 0.063, 0.0053, 0.036, 1.7e-7), 0.15),
+    ("split", "cpu"): Model(_split, (0.95, 0.078), 0.14),
+    ("keypoints", "cpu"): Model(_keypoints, (0.41, 0.13, 0.044), 0.1),
+    ("handgap", "cpu"): Model(_frames, (0.42, 0.0037), 0.0),
+    ("segment", "cpu"): Model(_segment, (1.2, 0.063, 0.17, 0.055), 0.07),
+    ("face", "cpu"): Model(_frames, (1.3, 0.017), 0.05),
+    ("smplx", "cpu"): Model(_smplx, (3.2, 0.0073, 0.00091), 0.14),
+    ("train", "cpu"): Model(_train("cpu"), (7.6, 0.28, 0.15, 0.0067, 0.045, 2.2e-7), 0.12),
     ("train", "cuda"): Model(_train("cuda"), (2.9, 0.01, 0, 0.0005, 0.0002, 1e-8), 1.0),
-    ("export", "cpu"): Model(_once, (2.0,), 0.0),
+    ("export", "cpu"): Model(_once, (4.0,), 0.0),
 }
 """By stage and device class."""
