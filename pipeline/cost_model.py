@@ -1,8 +1,8 @@
 """What a stage costs, by frames, pixels, steps and gaussians, on the machine that the coefficients were measured on.
 
 That is a server of two cores without a GPU: whole runs in draft and standard of clips of 7 to 65 frames, by `gsac bench
-forecast`; and for training on a GPU an H100. How much faster or slower another machine is, its
-own runs tell: `pipeline.cost_forecast`.
+forecast`; and for training on a GPU an H100. How much faster or slower another machine is, its own runs tell:
+`pipeline.cost_forecast`.
 """
 
 from __future__ import annotations
