@@ -1,10 +1,13 @@
 """Films of the asymmetric figure: its left hand is red, its right one blue, its front green."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gsac.avatar import film as rules
 from gsac.avatar.film import FOLLOW_S, draw_frames, find_distances, find_targets, fit_aspect, performance, turntable
 from gsac.avatar.motion.source import Motion
 from support.scripts import TOOLS, script
@@ -175,3 +178,13 @@ def test_the_readme_s_film_is_small_and_plays():
     assert file.stat().st_size < 1.5e6
     with Image.open(file) as film:
         assert film.n_frames > 200 and film.info["loop"] == 0
+
+
+@pytest.mark.parametrize(("file", "pattern", "expected"), [
+    ("camera.js", r"this\.fov = ([\d.]+);", rules.FOV), ("camera.js", r"\bPITCH = ([\d.]+);", rules.PITCH),
+    ("address.js", r"degrees, 1 to 150\"\) \?\? ([\d.]+),", rules.FOV),
+    ("viewer.js", r"\bSHADOW_RADIUS = ([\d.]+);", rules.SHADOW_RADIUS),
+    ("viewer.js", r"\bSHADOW_STRENGTH = ([\d.]+);", rules.SHADOW_STRENGTH)])
+def test_a_film_is_framed_and_shadowed_as_the_viewer_does_it(file, pattern, expected):
+    text = (Path(__file__).resolve().parents[2] / "viewer" / file).read_text()
+    assert [float(number) for number in re.findall(pattern, text)] == [expected]
