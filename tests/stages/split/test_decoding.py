@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.stages.contract import Job
-from gsac.stages.split import video
+from gsac.stages.split import ffmpeg_run, writing
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.decoding import NEAR, Chains, find_alone
 from gsac.stages.split.pick import pick_by_time
@@ -47,13 +47,13 @@ def split(source: Path, out: Path, **config) -> tuple[np.ndarray, np.ndarray, li
 @pytest.fixture
 def decoded(monkeypatch) -> list[int]:
     """How many frames ffmpeg was told to decode, run by run; 0: all."""
-    counts, real = [], video._run
+    counts, real = [], writing.run_ffmpeg
 
     def spy(path, video, output, folder, on_frame, read, how):
         counts.append(0 if how.needed is None else int(how.needed.sum()))
         return real(path, video, output, folder, on_frame, read, how)
 
-    monkeypatch.setattr(video, "_run", spy)
+    monkeypatch.setattr(writing, "run_ffmpeg", spy)
     return counts
 
 
@@ -74,7 +74,7 @@ def test_a_run_decodes_every_frame(tmp_path, decoded):
 def test_a_program_that_cannot_leave_frames_out_decodes_all(tmp_path, decoded, monkeypatch):
     clip = make_clip(tmp_path / "clip.mp4", *ENCODERS["plain"])
     times, frames, _ = split(clip, tmp_path / "quick", quick=True, count=7)
-    monkeypatch.setattr(video, "_leave_out", lambda sent, needed: ["-no_such_option", "1"])
+    monkeypatch.setattr(ffmpeg_run, "_leave_out", lambda sent, needed: ["-no_such_option", "1"])
     same_times, same, said = split(clip, tmp_path / "old", quick=True, count=7)
     assert decoded[1:] == [decoded[0], 0] and said == []
     assert np.array_equal(frames, same) and np.array_equal(times, same_times)

@@ -15,7 +15,7 @@ from PIL import Image
 
 from gsac.avatar.artifacts import Clip, frame_paths, read_frame
 from gsac.stages.contract import BadInput, Job
-from gsac.stages.split import video as video_stage
+from gsac.stages.split import writing
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.stage import run
 
@@ -138,8 +138,8 @@ def test_frames_of_two_half_pictures_come_without_combs_at_their_own_times(tmp_p
 
 def test_a_progressive_video_is_not_deinterlaced(tmp_path, monkeypatch):
     graphs = []
-    run_ffmpeg = video_stage._run
-    monkeypatch.setattr(video_stage, "_run", lambda path, video, output, *rest: graphs.append(output[1]) or run_ffmpeg(
+    run_ffmpeg = writing.run_ffmpeg
+    monkeypatch.setattr(writing, "run_ffmpeg", lambda path, video, output, *rest: graphs.append(output[1]) or run_ffmpeg(
         path, video, output, *rest))
     assert split(make_clip(tmp_path / "a.mp4", seconds=0.2), tmp_path / "out")[0].notes == []
     assert graphs and not any("dif" in graph for graph in graphs)
