@@ -160,9 +160,10 @@ class RunFolder:
                                "another --out")
         link(clip, self.clip)
         copied = None if self.clip.is_symlink() else content(self.clip, store)
-        after = {name: digests for name, digests in self._placed().items() if name != CLIP} | ({CLIP: copied} if copied else {})
-        if after != self._placed():
-            self._write_placed(after)
+        placed = self._placed()
+        if placed.get(CLIP) != copied:
+            others = {name: digests for name, digests in placed.items() if name != CLIP}
+            self._write_placed(others | {CLIP: copied} if copied else others)
 
     def discard(self) -> None:
         """Removes the folder, where `prepare` has made it and it holds nothing but what a run writes, and those made above it."""
