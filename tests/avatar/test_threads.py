@@ -76,7 +76,28 @@ def test_items_come_back_in_order_each_by_one_thread_with_a_workspace_of_its_own
         return float(buffer.sum())
 
     assert side_by_side(work, iter(range(12))) == [1000.0 * item for item in range(12)]
-    assert len(seen) == cores and all(len(by) == 1 for by in seen.values())
+    assert 1 <= len(seen) <= cores and all(len(by) == 1 for by in seen.values())
+
+
+def test_callers_inside_callers_come_to_an_end_however_few_threads_help(monkeypatch):
+    monkeypatch.setattr(threads, "available_cores", lambda: 2)
+    monkeypatch.setattr(threads, "_pools", {})
+
+    def outer(item: int, own: Workspace) -> list[int]:
+        return side_by_side(lambda inner, room: 10 * item + inner, range(3))
+
+    with ThreadPoolExecutor(4) as callers:
+        found = list(callers.map(lambda _: side_by_side(outer, range(5)), range(4), timeout=60))
+    assert found == [[[10 * item + inner for inner in range(3)] for item in range(5)]] * 4
+
+
+def test_threads_are_kept_from_call_to_call(monkeypatch):
+    monkeypatch.setattr(threads, "available_cores", lambda: 3)
+    side_by_side(lambda item, own: None, range(9))
+    before = threading.active_count()
+    for _ in range(20):
+        side_by_side(lambda item, own: None, range(9))
+    assert threading.active_count() <= before + 3
 
 
 def test_one_item_has_all_cores_and_none_is_no_trouble(monkeypatch):
@@ -89,6 +110,22 @@ def test_what_goes_wrong_with_an_item_is_heard(monkeypatch):
     monkeypatch.setattr(threads, "available_cores", lambda: 2)
     with pytest.raises(ZeroDivisionError):
         side_by_side(lambda item, own: 1 / item, [2, 1, 0])
+
+
+def test_of_several_items_that_fail_the_first_is_told(monkeypatch):
+    monkeypatch.setattr(threads, "available_cores", lambda: 2)
+    late = threading.Event()
+
+    def work(item: int, own: Workspace) -> None:
+        if item == 1:
+            assert late.wait(20)
+        if item == 2:
+            late.set()
+        if item:
+            raise ValueError(item)
+
+    with pytest.raises(ValueError, match="1"):
+        side_by_side(work, range(6))
 
 
 @pytest.mark.parametrize("cores", [1, 2, 5])
