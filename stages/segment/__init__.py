@@ -8,8 +8,8 @@ gives  alpha/%06d.exr (H, W) half, 0..1; with method sapiens also alpha/labels/%
 A person network finds the rough region (`network.py`), GrabCut at half size its outline (`grabcut.py`), of which the parts that
 are no person are dropped (`components.py`). At full size the outline is corrected by the empty scene (`correction.py`), where the
 bones tell clothes that look like it from gaps (`bones.py`). A small network of our own, which sees frame, plate, outline and
-region, gives the soft edge (`edge_network.py`), and the colours' course from pixel to pixel settles where it is not sure
-(`matting.py`, its loops in `matting_kernels.py`).
+region, gives the soft edge, and alpha where the outline has lost what lies beside a bone (`edge_network.py`); the colours' course
+from pixel to pixel settles where it is not sure (`matting.py`, its loops in `matting_kernels.py`).
 Each step uses a plate, the empty scene, where there is one (`plate.py`); from a video of a still camera it is computed, once from
 the rough regions and again from the outlines (`plate_from_video.py`). The alpha of Sapiens, a network that the user brings, is soft
 already and corrected by the plate only (`avatar/sapiens.py`). Masks that the user brought stay as they are (`brought.py`).

@@ -32,6 +32,8 @@ CAMOUFLAGE = 0.03
 ON_BONE, BESIDE = 0.012, 0.04
 """Shares of the picture's height: what looks like the scene and comes so near to a bone is clothing, and so is what lies so near to
 clothing."""
+LOST = 0.06
+"""Share of the picture's height: so near to a bone lies all of a limb."""
 LIKELY, MOSTLY = 0.8, 0.3
 """Network probability above which a pixel is likely the person's, and the least share of such pixels in clothing."""
 SPECK = 1e-4
@@ -113,6 +115,15 @@ def find_clothing(labels: np.ndarray, gap: np.ndarray, bones: np.ndarray, likely
         apart = cv2.distanceTransform((~telling[labels]).astype(np.uint8), cv2.DIST_L2, 5)
         clothing |= ours & (nearest(apart) < BESIDE * len(labels))
     return clothing
+
+
+def find_lost(outline: np.ndarray, probability: np.ndarray, bones: np.ndarray) -> np.ndarray:
+    """(H, W) bool, what lies beside a bone and is more likely the person than not, though the outline leaves it out: of trousers as
+    green as the carpet GrabCut leaves half a calf, with edges that lie deep inside.
+
+    outline: (H, W) bool; probability: (H, W) uint8, the network's; bones: (H, W) px, from the bones.
+    """
+    return (probability > 127) & ~outline & (bones < LOST * len(outline))
 
 
 def keep_squares(mask: np.ndarray) -> np.ndarray:

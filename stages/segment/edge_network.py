@@ -1,4 +1,4 @@
-"""Alpha near the outline by a small network, which sees the frame, the empty scene, the outline and the rough region.
+"""Alpha near the outline, and in what that has lost, by a small network, which sees the frame, the empty scene, the outline and the rough region.
 
 A U-Net of 0.27 million weights, trained on rendered people of whom no figure in docs/lab is one (`tools/edge_network/`).
 """
@@ -40,6 +40,8 @@ class CloseUp(NamedTuple):
     """(H, W) uint8, 255: certainly the person."""
     scene: Plate | None
     """The empty scene in the frame's exposure; None where nobody knows it."""
+    lost: np.ndarray
+    """(H, W) bool: `correction.find_lost`."""
 
     def stacked(self) -> np.ndarray:
         """(H, W, 9) uint8: image, scene, where the scene is known, outline, probability."""
@@ -55,15 +57,16 @@ class CloseUp(NamedTuple):
 
 
 def find_alpha(seen: CloseUp) -> np.ndarray:
-    """(H, W) float32 alpha: the network's within `BAND` of the outline, elsewhere the outline."""
+    """(H, W) float32 alpha: the network's within `BAND` of the outline and in what that has lost, elsewhere the outline."""
     outline = seen.outline.astype(np.uint8)
     alpha = seen.outline.astype(np.float32)
-    rows, columns = np.flatnonzero(outline.any(axis=1)), np.flatnonzero(outline.any(axis=0))
+    theirs = seen.outline | seen.lost
+    rows, columns = np.flatnonzero(theirs.any(axis=1)), np.flatnonzero(theirs.any(axis=0))
     if len(rows) == 0:
         return alpha
     part = np.s_[max(0, rows[0] - AROUND): rows[-1] + AROUND + 1, max(0, columns[0] - AROUND): columns[-1] + AROUND + 1]
     near = _square(BAND)
-    band = ((cv2.dilate(outline, near) > 0) & (cv2.erode(outline, near) == 0))[part]
+    band = ((cv2.dilate(outline, near) > 0) & (cv2.erode(outline, near) == 0) | seen.lost)[part]
     alpha[part][band] = np.minimum(_ask(seen.stacked()[part])[band], 1)  # its last step may end a rounding above 1
     return alpha
 

@@ -25,7 +25,7 @@ from gsac.stages.segment.bones import distance_to_bones
 from gsac.stages.segment.brought import MASKS, hand_on, refuse_inverted
 from gsac.stages.segment.components import keep_person, keep_soft_person
 from gsac.stages.segment.config import Method
-from gsac.stages.segment.correction import LIKELY, correct, match_scene
+from gsac.stages.segment.correction import LIKELY, correct, find_lost, match_scene
 from gsac.stages.segment.edge_network import CloseUp, find_alpha, open_edge_network
 from gsac.stages.segment.grabcut import cut_out
 from gsac.stages.segment.matting import settle
@@ -327,11 +327,11 @@ def to_bytes(probability: np.ndarray) -> np.ndarray:
 def close_up(cutout: Cutout, plate: Plate | None) -> CloseUp:
     """What the network of the soft edge is shown: the outline corrected where the plate shows the frame's scene."""
     outline, part = cutout.outline, cutout.image
+    bones = distance_to_bones(outline.shape, cutout.xy, cutout.score)
     scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
     if scene is not None:
-        bones = distance_to_bones(outline.shape, cutout.xy, cutout.score)
         outline = correct(part, outline, scene, bones, cutout.probability > LIKELY * 255)
-    return CloseUp(part, outline, cutout.probability, scene)
+    return CloseUp(part, outline, cutout.probability, scene, find_lost(outline, cutout.probability, bones))
 
 
 def soften(seen: CloseUp) -> np.ndarray:

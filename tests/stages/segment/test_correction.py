@@ -6,7 +6,7 @@ import pytest
 
 from gsac.avatar.artifacts import write_frame
 from gsac.stages.segment.bones import distance_to_bones
-from gsac.stages.segment.correction import correct, match_scene
+from gsac.stages.segment.correction import correct, find_lost, match_scene
 from gsac.stages.segment.plate import Plate
 from gsac.stages.segment.plate_from_video import relearn_plate
 
@@ -111,6 +111,20 @@ def test_without_a_bone_or_where_the_network_doubts_what_looks_like_the_scene_op
     kept = correct(image, outline, match_scene(image, outline, plate), at, np.full(SIZE, not bones))
     assert np.isinf(at).all() != bones
     assert not any(middle(kept, part).any() for part in (ON_BONE, BESIDE, SLIT))
+
+
+def test_lost_is_what_lies_beside_a_bone_and_is_likely_the_persons_not_a_stranger_who_stands_apart():
+    xy, score = np.zeros((133, 2)), np.zeros(133)
+    xy[[13, 15]], score[[13, 15]] = [(60, 100), (60, 180)], 1.0  # a shin
+    bones = distance_to_bones((200, 200), xy, score)
+    outline, probability = np.zeros((200, 200), bool), np.zeros((200, 200), np.uint8)
+    probability[90:190, 50:71] = probability[90:190, 140:171] = 255
+    outline[90:130, 50:71] = True
+    probability[150:160, 50:71] = 100
+    lost = find_lost(outline, probability, bones)
+    assert lost[130:150, 50:71].all() and lost[160:185, 52:69].all()
+    assert not lost[:130].any() and not lost[150:160].any() and not lost[:, 140:].any()
+    assert not find_lost(outline, probability, distance_to_bones((200, 200), xy, 0 * score)).any()
 
 
 def test_a_plate_is_fitted_to_the_exposure_and_one_of_another_place_is_refused():
