@@ -1,4 +1,4 @@
-"""Alpha near the outline, and in what that has lost, by a small network, which sees the frame, the empty scene, the outline and the rough region.
+"""Alpha near the outline, and in what that has lost, by a small network, which sees frame, empty scene, outline and rough region.
 
 A U-Net of 0.27 million weights, trained on rendered people of whom no figure in docs/lab is one (`tools/edge_network/`).
 """
