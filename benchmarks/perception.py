@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_arrays, read_frame, write_frame
+from gsac.avatar.artifacts import Clip, frame_paths, read_arrays
+from gsac.avatar.frame_files import read_frame, write_frame
 from gsac.avatar.network_files import model_path
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.stages.contract import Job, Stage

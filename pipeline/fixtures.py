@@ -12,7 +12,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from gsac.avatar.artifacts import Clip, frame_paths, image_size
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import image_size
 from gsac.avatar.frame_range import CLIP_FILE, copy_frames, count_frames
 from gsac.cache.digest import tree_digest
 from gsac.pipeline.graph import CLIP

@@ -138,7 +138,7 @@ def save(path: Path, image: np.ndarray) -> None:
     """image: (H, W, 3) uint8 BGR."""
     import cv2
 
-    from gsac.avatar.artifacts import write_image
+    from gsac.avatar.frame_files import write_image
 
     path.parent.mkdir(parents=True, exist_ok=True)
     write_image(path, image, cv2.IMWRITE_JPEG_QUALITY, QUALITY)

@@ -13,10 +13,11 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import wholebody
-from gsac.avatar.artifacts import BODY_SHAPES, write_arrays, write_frame, write_image
+from gsac.avatar.artifacts import BODY_SHAPES, write_arrays
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.ffmpeg import ffmpeg_program
+from gsac.avatar.frame_files import write_frame, write_image
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, WRISTS, J
 from gsac.avatar.skinning import joint_transforms
 from gsac.avatar.zbuffer import visible_points

@@ -11,8 +11,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import BODY_SHAPES, frame_paths, read_arrays, read_frame
+from gsac.avatar.artifacts import BODY_SHAPES, frame_paths, read_arrays
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import BODY, J
 from gsac.avatar.metrics import summary

@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gsac.avatar.artifacts import frame_paths, read_alpha, read_arrays, write_alpha, write_arrays
+from gsac.avatar.artifacts import frame_paths, read_arrays, write_arrays
+from gsac.avatar.frame_files import read_alpha, write_alpha
 from gsac.benchmarks.stability.fault import Origin
 from gsac.cache.store import Store
 from gsac.pipeline.model_store import ModelStore

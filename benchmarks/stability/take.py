@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gsac.avatar.artifacts import frame_paths, read_arrays, read_frame
+from gsac.avatar.artifacts import frame_paths, read_arrays
+from gsac.avatar.frame_files import read_frame
 from gsac.benchmarks.fit.truth import Truth, read_truth
 from gsac.stages.contract import BadInput
 

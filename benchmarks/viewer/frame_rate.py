@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gsac.avatar.artifacts import write_image
+from gsac.avatar.frame_files import write_image
 from gsac.benchmarks.viewer.browser import WEBGPU, Browser
 from gsac.stages.contract import StageError
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import write_arrays, write_frame, write_image
+from gsac.avatar.artifacts import write_arrays
 from gsac.avatar.files import write_file
+from gsac.avatar.frame_files import write_frame, write_image
 from gsac.cache.half_made import half_made
 from gsac.pipeline.data_sets.given import GivenClip
 from gsac.stages.contract import BadInput

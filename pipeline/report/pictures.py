@@ -10,16 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import (
-    FILLED_SHAPES,
-    KEYPOINT_SHAPES,
-    ArtifactError,
-    Clip,
-    check_arrays,
-    frame_paths,
-    read_alpha,
-    read_frame,
-)
+from gsac.avatar.artifacts import FILLED_SHAPES, KEYPOINT_SHAPES, ArtifactError, Clip, check_arrays, frame_paths
+from gsac.avatar.frame_files import read_alpha, read_frame
 from gsac.avatar.wholebody import BODY, FEET
 from gsac.pipeline.report.results import AbsentError, Results
 

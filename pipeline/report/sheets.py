@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 
 from gsac.avatar import rotation
-from gsac.avatar.artifacts import frame_paths, read_frame
+from gsac.avatar.artifacts import frame_paths
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera_motion import find_moved, make_view, measure_sway
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.wholebody import BODY, FACE, FEET, HANDS
 from gsac.avatar.yaw import turn_seen
 from gsac.pipeline.report.drawing import draw_body, draw_keypoints, draw_reprojection, over_magenta

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.artifacts import read_frame
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import WHITE, composite
 from gsac.avatar.raster import render_bound

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_arrays
+from gsac.avatar.artifacts import Clip, frame_paths, write_arrays
 from gsac.avatar.facemesh import POINTS
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.threads import available_cores
 from gsac.avatar.wholebody import FACE, INDEX
 from gsac.stages.contract import Job

@@ -10,7 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, read_frame, write_arrays
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, write_arrays
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.region import Region
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.avatar.wholebody import FACE, HANDS

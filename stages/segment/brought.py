@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import read_alpha, read_frame
 from gsac.avatar.camera_motion import View, make_view
+from gsac.avatar.frame_files import read_alpha, read_frame
 from gsac.avatar.mask_file import LEAST_SHOWN
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.contract import BadInput, StageError

@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import read_frame
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.threads import available_cores, prefetch
 from gsac.stages.segment.plate import Plate
 

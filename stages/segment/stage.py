@@ -11,8 +11,9 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_alpha, write_image
+from gsac.avatar.artifacts import Clip, frame_paths
 from gsac.avatar.camera_motion import View, find_moved, make_view, measure_sway
+from gsac.avatar.frame_files import read_frame, write_alpha, write_image
 from gsac.avatar.onnx_network import NetworkError
 from gsac.avatar.sapiens import Sapiens
 from gsac.avatar.threads import available_cores, prefetch

@@ -13,9 +13,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import read_alpha
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
+from gsac.avatar.frame_files import read_alpha
 from gsac.avatar.threads import available_cores
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.smplx.jacobians import Pairs, make_surface_pairs

@@ -8,8 +8,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import Clip, write_arrays
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import write_alpha, write_frame
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.contract import Job
 from gsac.stages.smplx.config import SmplxConfig

@@ -12,7 +12,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from gsac.avatar.artifacts import Crop, write_alpha
+from gsac.avatar.artifacts import Crop
+from gsac.avatar.frame_files import write_alpha
 from gsac.avatar.mask_file import MaskError, read_mask, resize_mask, scale_mask
 from gsac.stages.contract import BadInput
 from gsac.stages.split.film import MASKS

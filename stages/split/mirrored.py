@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import frame_paths, read_frame, write_frame
+from gsac.avatar.artifacts import frame_paths
+from gsac.avatar.frame_files import read_frame, write_frame
 
 APART = 6.0
 """Median change of a block, of 255, from which on two pictures of the room differ: a symmetric or plain one tells no side."""

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import frame_paths, read_frame
+from gsac.avatar.artifacts import frame_paths
 from gsac.avatar.blazepose import Pose, PoseNetworks
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.region import Region
 from gsac.stages.split.crop import Extent, plan_crop
 

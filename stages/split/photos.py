@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageCms, ImageOps, UnidentifiedImageError
 
-from gsac.avatar.artifacts import Crop, write_alpha, write_frame
+from gsac.avatar.artifacts import Crop
+from gsac.avatar.frame_files import write_alpha, write_frame
 from gsac.stages.contract import BadInput
 from gsac.stages.findings import Code, Finding
 from gsac.stages.split import focal

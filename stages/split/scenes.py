@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import read_frame
+from gsac.avatar.frame_files import read_frame
 from gsac.stages.split.crop import SIDES, Extent
 from gsac.stages.split.people import People
 from gsac.stages.split.pick import pick_evenly

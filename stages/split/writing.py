@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import Crop, frame_paths, read_frame
+from gsac.avatar.artifacts import Crop, frame_paths
+from gsac.avatar.frame_files import read_frame
 from gsac.stages.contract import StageError
 from gsac.stages.findings import Code, Finding
 from gsac.stages.split.config import SplitConfig

@@ -14,13 +14,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from gsac.avatar import rotation
-from gsac.avatar.artifacts import Clip, frame_paths, write_frame
+from gsac.avatar.artifacts import Clip, frame_paths
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.cuda import perceptual, why_not
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.feature_distance import LEAST_SIDE
 from gsac.avatar.files import write_file
+from gsac.avatar.frame_files import write_frame
 from gsac.avatar.freed_memory import hand_back
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.lpips import Lpips

@@ -10,8 +10,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import frame_paths, read_alpha, read_frame
+from gsac.avatar.artifacts import frame_paths
 from gsac.avatar.camera import Camera
+from gsac.avatar.frame_files import read_alpha, read_frame
 from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import available_cores, side_by_side
 from gsac.stages.contract import StageError

@@ -6,18 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import (
-    KEYPOINT_SHAPES,
-    ArtifactError,
-    check_arrays,
-    check_keypoints,
-    read_alpha,
-    read_arrays,
-    read_frame,
-    write_alpha,
-    write_arrays,
-    write_frame,
-)
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, ArtifactError, check_arrays, check_keypoints, read_arrays, write_arrays
+from gsac.avatar.frame_files import read_alpha, read_frame, write_alpha, write_frame
 from support.artifacts import blank
 
 

@@ -8,7 +8,8 @@ SHORT = """
 import errno, json, resource, signal, sys
 from pathlib import Path
 import numpy as np
-from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import Clip, write_arrays
+from gsac.avatar.frame_files import write_alpha, write_frame
 
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 rng = np.random.default_rng(0)

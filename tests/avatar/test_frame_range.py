@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import BODY_SHAPES, Clip, frame_paths, read_arrays, write_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import BODY_SHAPES, Clip, frame_paths, read_arrays, write_arrays
+from gsac.avatar.frame_files import write_alpha, write_frame
 from gsac.avatar.frame_range import copy_frames, count_frames
 from support.artifacts import blank
 

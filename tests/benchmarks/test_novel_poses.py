@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import write_frame
 from gsac.avatar.camera import Camera
+from gsac.avatar.frame_files import write_frame
 from gsac.benchmarks.speed_accuracy.novel_poses import read_views
 
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_frame
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths
+from gsac.avatar.frame_files import read_frame
 from gsac.benchmarks.fit.truth import Truth
 from gsac.benchmarks.stability import bench, chart, outcome, pairs, stages, table, trial, workers
 from gsac.benchmarks.stability.code import hash_code

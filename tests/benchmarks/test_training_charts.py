@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import write_frame, write_image
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import write_frame, write_image
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.zbuffer import rasterise
 from gsac.benchmarks import as_filmed, training

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import write_frame
+from gsac.avatar.frame_files import write_frame
 from gsac.benchmarks.viewer import browser as chromium
 from gsac.pipeline.executors.executor import ClipJob, ClipResult
 from gsac.pipeline.report import batch

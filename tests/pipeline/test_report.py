@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, read_frame, write_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import Clip, write_arrays
 from gsac.avatar.body import LOST, Body, BodyParams
+from gsac.avatar.frame_files import read_frame, write_alpha, write_frame
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.viewer import browser as chromium

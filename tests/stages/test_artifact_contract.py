@@ -26,13 +26,11 @@ from gsac.avatar.artifacts import (
     ArtifactError,
     Clip,
     Crop,
-    read_alpha,
     read_arrays,
-    write_alpha,
     write_arrays,
-    write_frame,
 )
 from gsac.avatar.body import Body
+from gsac.avatar.frame_files import read_alpha, write_alpha, write_frame
 from gsac.avatar.frame_range import copy_frames
 from gsac.pipeline.fixtures import fixture_paths
 from gsac.pipeline.project import Project

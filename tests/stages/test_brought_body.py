@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from gsac import unity
-from gsac.avatar.artifacts import Clip, write_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import Clip, write_arrays
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import write_alpha, write_frame
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages import export, smplx, train

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, write_alpha, write_arrays
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, write_arrays
+from gsac.avatar.frame_files import write_alpha
 from gsac.stages.contract import StageError
 from gsac.stages.missing_frames import pair_masks, read_keypoints
 from support.artifacts import blank

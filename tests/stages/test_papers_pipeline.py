@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import read_arrays, write_frame
+from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import write_frame
 from gsac.avatar.gsac_file.rigged import RiggedAvatar
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.avatar.wholebody import HANDS, INDEX, LEFT_HAND

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gsac.avatar import rotation
-from gsac.avatar.artifacts import write_alpha
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import write_alpha
 from gsac.avatar.zbuffer import silhouette
 from gsac.stages.smplx.sightings import HIPS, Sightings
 from gsac.stages.smplx.silhouette import Outline, read_outline

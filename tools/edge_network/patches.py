@@ -16,7 +16,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import read_frame
 from gsac.stages.missing_frames import read_keypoints
 from gsac.stages.segment.edge_network import CloseUp
 from gsac.stages.segment.network import PoseMask, person_region

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.artifacts import read_frame
 from gsac.avatar.body import Body
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.instant_hmr import InstantHmr, to_wholebody
 from gsac.avatar.joints import J
 from gsac.avatar.pose_files.read import Start

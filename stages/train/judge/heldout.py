@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from gsac.avatar import wholebody
-from gsac.avatar.artifacts import write_frame
 from gsac.avatar.camera import Camera
 from gsac.avatar.feature_distance import FeatureDistance
+from gsac.avatar.frame_files import write_frame
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import WHITE, composite, find_shown, score, score_person
 from gsac.avatar.raster import render_bound, render_bound_backward

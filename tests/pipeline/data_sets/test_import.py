@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_alpha, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import read_alpha, read_frame
 from gsac.pipeline.cli import execute
 from gsac.pipeline.data_sets.read import read_data_set
 from gsac.pipeline.data_sets.write import write_clip

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import write_frame
 from gsac.avatar.facemesh import IBUG68
 from gsac.avatar.flame_file import read_flame, read_flame_points
+from gsac.avatar.frame_files import write_frame
 from gsac.stages.contract import BadInput, make_config
 from gsac.stages.face import STAGE
 from gsac.stages.face.deca import CODES, DecaEncoder

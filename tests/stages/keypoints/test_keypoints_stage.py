@@ -242,7 +242,7 @@ def test_points_lie_where_the_rendered_truth_has_them(tmp_path, store):
 @pytest.mark.footage
 @pytest.mark.slow
 def test_a_person_is_found_in_every_photo_of_a_turn(tmp_path, store):
-    from gsac.avatar.artifacts import read_frame
+    from gsac.avatar.frame_files import read_frame
 
     photos = sorted(need(FOOTAGE / "turn-photos" / "000.jpg").parent.glob("[0-9]*.jpg"))
     arrays, warnings = stage_on([read_frame(path) for path in photos], tmp_path, store)

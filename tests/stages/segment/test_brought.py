@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, read_alpha, write_alpha, write_arrays
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, frame_paths, write_arrays
+from gsac.avatar.frame_files import read_alpha, write_alpha
 from gsac.stages.contract import BadInput, Job, StageError
 from gsac.stages.segment import stage as segment
 from gsac.stages.segment.config import SegmentConfig

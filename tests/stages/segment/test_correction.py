@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import write_frame
+from gsac.avatar.frame_files import write_frame
 from gsac.stages.segment.bones import distance_to_bones
 from gsac.stages.segment.correction import correct, find_lost, match_scene
 from gsac.stages.segment.plate import Plate

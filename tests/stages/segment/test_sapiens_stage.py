@@ -4,7 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, write_arrays
+from gsac.avatar.frame_files import read_alpha, write_frame
 from gsac.avatar.sapiens import PARTS, Sapiens
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.segment import stage

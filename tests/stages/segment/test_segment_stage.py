@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, read_alpha, write_arrays, write_frame
+from gsac.avatar.artifacts import KEYPOINT_SHAPES, Clip, frame_paths, write_arrays
+from gsac.avatar.frame_files import read_alpha, write_frame
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.stages.contract import Job, StageError
 from gsac.stages.segment import stage

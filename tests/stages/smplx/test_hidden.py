@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import read_alpha, write_alpha
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import read_alpha, write_alpha
 from gsac.avatar.wholebody import INDEX
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.hidden import describe_hidden, find_occluder, hide, leave_out_outside

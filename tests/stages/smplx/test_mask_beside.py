@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import check_filled_keypoints, frame_paths, read_alpha, write_alpha, write_arrays
+from gsac.avatar.artifacts import check_filled_keypoints, frame_paths, write_arrays
 from gsac.avatar.body import Body
+from gsac.avatar.frame_files import read_alpha, write_alpha
 from gsac.stages.contract import Job
 from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import read_frame
 from gsac.stages.contract import Job
 from gsac.stages.split import ffmpeg_run, writing
 from gsac.stages.split.config import SplitConfig

@@ -4,7 +4,8 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import read_frame
 from gsac.stages.contract import Job
 from gsac.stages.findings import Code
 from gsac.stages.split.config import SplitConfig

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gsac.avatar.artifacts import Clip, Crop, frame_paths, read_frame
+from gsac.avatar.artifacts import Clip, Crop, frame_paths
+from gsac.avatar.frame_files import read_frame
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.split.config import SplitConfig
 from gsac.stages.split.film import find_film

@@ -9,7 +9,8 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame, write_frame
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import read_frame, write_frame
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.stages.contract import Job
 from gsac.stages.findings import Code

@@ -13,7 +13,8 @@ import pillow_heif
 import pytest
 from PIL import Image
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import read_frame
 from gsac.stages.contract import BadInput, Job
 from gsac.stages.split import writing
 from gsac.stages.split.config import SplitConfig

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gsac.avatar.artifacts import Clip, frame_paths, read_alpha, read_frame
+from gsac.avatar.artifacts import Clip, frame_paths
+from gsac.avatar.frame_files import read_alpha, read_frame
 from gsac.avatar.network_files import ModelMissingError, model_path
 from gsac.stages.contract import Job
 from gsac.stages.findings import Code

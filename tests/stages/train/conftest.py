@@ -5,10 +5,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import Clip, write_alpha, write_frame
+from gsac.avatar.artifacts import Clip
 from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.cuda import why_not
+from gsac.avatar.frame_files import write_alpha, write_frame
 from gsac.avatar.light import FROM_CAMERA, shade
 from gsac.avatar.zbuffer import interpolate, rasterise
 from gsac.stages.contract import Job, make_config

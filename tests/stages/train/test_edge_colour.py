@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import write_alpha, write_frame
 from gsac.avatar.camera import Camera
+from gsac.avatar.frame_files import write_alpha, write_frame
 from gsac.stages.train.edge_colour import unmix
 from gsac.stages.train.views import read_whole
 

@@ -6,8 +6,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import read_arrays, read_frame
+from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.body import LOST, Body, BodyParams
+from gsac.avatar.frame_files import read_frame
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.metrics import summary
 from gsac.stages.contract import BadInput, StageError, make_config

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.artifacts import read_alpha, read_frame, write_alpha, write_frame
 from gsac.avatar.camera import Camera
+from gsac.avatar.frame_files import read_alpha, read_frame, write_alpha, write_frame
 from gsac.stages.train.edge_colour import unmix
 from gsac.stages.train.views import View, person_crop, read_views, read_whole
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import read_alpha, write_alpha
+from gsac.avatar.frame_files import read_alpha, write_alpha
 from gsac.avatar.joints import INDEX
 from gsac.avatar.wholebody import INDEX as POINT
 from gsac.avatar.wholebody import LEFT_HAND

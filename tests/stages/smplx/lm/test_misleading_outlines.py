@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from gsac.avatar.artifacts import frame_paths, read_alpha, write_alpha
+from gsac.avatar.artifacts import frame_paths
+from gsac.avatar.frame_files import read_alpha, write_alpha
 from gsac.stages.findings import Code
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.lm import misleading_outlines

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gsac.avatar import rotation
-from gsac.avatar.artifacts import write_frame
 from gsac.avatar.body import Body, BodyParams
+from gsac.avatar.frame_files import write_frame
 from gsac.avatar.instant_hmr import BODY, HAND_BEGINS
 from gsac.avatar.joints import INDEX as JOINT
 from gsac.avatar.wholebody import HANDS, INDEX
