@@ -54,6 +54,7 @@ def open_network(path: Path, name: str, threads: int = 0) -> InferenceSession:
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
+    options.enable_mem_pattern = False  # a plan for each size of picture, and those of people differ: 150 MB a thread
     here = PREFERRED[-1:] if is_forbidden() else onnxruntime.get_available_providers()
     if path.is_dir():
         path = next(path.glob("*.onnx"), path)

@@ -51,14 +51,12 @@ MOSTLY = 0.5
 
 
 class Cutout(NamedTuple):
-    """The person in a frame, before the soft edge."""
+    """The person in a frame, before the soft edge; the picture is read again then, since all frames' would fill the memory."""
 
     box: tuple[int, int, int, int]
     """x0, y0, x1, y1 px of the part of the frame that `outline` is of."""
     outline: np.ndarray
     """(h, w) bool."""
-    image: np.ndarray
-    """(h, w, 3) uint8, that part of the frame."""
     xy: np.ndarray
     """(133, 2) px from the part's corner."""
     score: np.ndarray
@@ -237,8 +235,10 @@ class Cutting:
 
     def write_soft(self, t: int) -> None:
         """Writes frame t's alpha with its soft edge."""
-        shape = self.clip.height, self.clip.width
-        alpha = np.zeros(shape, np.float32) if self.absent[t] else finish(self.cutouts.pop(t), shape, self.plate)
+        if self.absent[t]:
+            alpha = np.zeros((self.clip.height, self.clip.width), np.float32)
+        else:
+            alpha = finish(read_frame(self.paths[t]), self.cutouts.pop(t), self.plate)
         write_alpha(self.job.out / "alpha" / f"{self.paths[t].stem}.exr", alpha)
 
 
@@ -272,7 +272,7 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
     """
     box = around(probability)
     if box is None:
-        return nobody(image, xy, score), True
+        return nobody(xy, score), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     corner = np.array(box[:2])
     here = None
@@ -283,7 +283,7 @@ def cut_frame(image: np.ndarray, probability: np.ndarray, xy: np.ndarray, score:
         here = here.part((box[0] - x0, box[1] - y0, box[2] - x0, box[3] - y0))
     xy = xy - corner
     outline = keep_person(cut_out(image[part], probability[part], xy, score, iterations, here), xy, score) > 0.5
-    cutout = Cutout(box, outline, image[part].copy(), xy, score, to_bytes(probability[part]))
+    cutout = Cutout(box, outline, xy, score, to_bytes(probability[part]))
     return cutout, plate is None or here is not None
 
 
@@ -296,19 +296,19 @@ def cut_soft_frame(image: np.ndarray, alpha: np.ndarray, xy: np.ndarray, score: 
     kept = keep_soft_person(alpha, xy, score)
     box = around(kept)
     if box is None:
-        return nobody(image, xy, score), True
+        return nobody(xy, score), True
     part = np.s_[box[1]: box[3], box[0]: box[2]]
     fits = True
     if plate is not None:
         x0, y0, x1, y1 = wide = around(kept, margin=WIDE) or box
         fits = compare(image[y0:y1, x0:x1], half_of(plate, wide), kept[y0:y1, x0:x1]) is not None
     soft = kept[part]
-    return Cutout(box, soft > 0.5, image[part].copy(), xy - box[:2], score, to_bytes(soft), soft.astype(np.float16)), fits
+    return Cutout(box, soft > 0.5, xy - box[:2], score, to_bytes(soft), soft.astype(np.float16)), fits
 
 
-def nobody(image: np.ndarray, xy: np.ndarray, score: np.ndarray) -> Cutout:
-    """The cut-out of a frame that shows nobody. image: (H, W, 3) uint8; xy: (133, 2) px; score: (133,)."""
-    return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), image[:0, :0], xy, score, np.zeros((0, 0), np.uint8))
+def nobody(xy: np.ndarray, score: np.ndarray) -> Cutout:
+    """The cut-out of a frame that shows nobody. xy: (133, 2) px; score: (133,)."""
+    return Cutout((0, 0, 0, 0), np.zeros((0, 0), bool), xy, score, np.zeros((0, 0), np.uint8))
 
 
 def keep_labels(labels: np.ndarray, cutout: Cutout) -> np.ndarray:
@@ -325,9 +325,13 @@ def to_bytes(probability: np.ndarray) -> np.ndarray:
     return (probability * 255 + 0.5).astype(np.uint8)
 
 
-def close_up(cutout: Cutout, plate: Plate | None) -> CloseUp:
-    """What the network of the soft edge is shown: the outline corrected where the plate shows the frame's scene."""
-    outline, part = cutout.outline, cutout.image
+def close_up(image: np.ndarray, cutout: Cutout, plate: Plate | None) -> CloseUp:
+    """What the network of the soft edge is shown: the outline corrected where the plate shows the frame's scene.
+
+    image: (H, W, 3) uint8, the frame.
+    """
+    x0, y0, x1, y1 = cutout.box
+    outline, part = cutout.outline, np.ascontiguousarray(image[y0:y1, x0:x1])
     bones = distance_to_bones(outline.shape, cutout.xy, cutout.score)
     scene = None if plate is None else match_scene(part, outline, plate.part(cutout.box))
     if scene is not None:
@@ -340,16 +344,16 @@ def soften(seen: CloseUp) -> np.ndarray:
     return settle(seen.image, find_alpha(seen))
 
 
-def finish(cutout: Cutout, shape: tuple[int, ...], plate: Plate | None) -> np.ndarray:
-    """Alpha (H, W) float32 of a frame: the outline, corrected where the plate shows the scene, with a soft edge. shape: H, W.
+def finish(image: np.ndarray, cutout: Cutout, plate: Plate | None) -> np.ndarray:
+    """Alpha (H, W) float32 of a frame: the outline, corrected where the plate shows the scene, with a soft edge.
 
-    An edge that was soft already stays but where the outline was corrected.
+    An edge that was soft already stays but where the outline was corrected. image: (H, W, 3) uint8, the frame.
     """
-    alpha = np.zeros(shape, np.float32)
+    alpha = np.zeros(image.shape[:2], np.float32)
     if not cutout.outline.any():
         return alpha
     x0, y0, x1, y1 = cutout.box
-    seen = close_up(cutout, plate)
+    seen = close_up(image, cutout, plate)
     if cutout.soft is None:
         alpha[y0:y1, x0:x1] = soften(seen)
         return alpha

@@ -51,7 +51,7 @@ def look(run: Path, pose_network: Path) -> Iterator[tuple[int, tuple[int, int, i
     plate = relearn_plate(paths, there, lambda t, image: cutouts[t].on_frame(image.shape))
     for t, cutout in cutouts.items():
         if cutout.outline.any():
-            yield t, cutout.box, close_up(cutout, plate)
+            yield t, cutout.box, close_up(images[t], cutout, plate)
 
 
 def draw(planes: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -57,7 +57,7 @@ def empty_scene(background, seed=5):
 def mask_frame(image, probability, points, plate):
     """Alpha (H, W) of a frame by itself, and whether the plate, if any, fits it. points: xy (133, 2) px, score (133,)."""
     cutout, fits = cut_frame(image, probability, *points, plate, 1)
-    return finish(cutout, image.shape[:2], plate), fits
+    return finish(image, cutout, plate), fits
 
 
 def rough(alpha, sigma=8.0):

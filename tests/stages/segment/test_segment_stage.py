@@ -181,7 +181,7 @@ def test_truth_a_is_cut_out_without_a_plate_closer_than_matting_alone_does(tmp_p
         xy[:23], score[:23] = joints[i], 0.9
         said = network(image, stage.person_region(xy, score))
         cutout, _ = stage.cut_frame(image, said, xy, score, None, SegmentConfig().iterations)
-        alpha = stage.finish(cutout, image.shape[:2], None)
+        alpha = stage.finish(image, cutout, None)
         truth = cv2.imread(str(source / f"mask/{i:04d}.png"), cv2.IMREAD_GRAYSCALE) / 255
         ours, true = alpha > 0.5, truth > 0.5
         overlaps.append((ours & true).sum() / (ours | true).sum())
