@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, BinaryIO
 from gsac.avatar.artifacts import ArtifactError
 from gsac.avatar.files import told_no_room, write_file
 
-if TYPE_CHECKING:  # numpy is imported where it works: every `gsac status` reads this file
+if TYPE_CHECKING:  # numpy is imported where it works
     import numpy as np
 
 
