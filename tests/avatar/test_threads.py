@@ -5,6 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -93,11 +94,16 @@ def test_callers_inside_callers_come_to_an_end_however_few_threads_help(monkeypa
 
 def test_threads_are_kept_from_call_to_call(monkeypatch):
     monkeypatch.setattr(threads, "available_cores", lambda: 3)
-    side_by_side(lambda item, own: None, range(9))
-    before = threading.active_count()
+    monkeypatch.setattr(threads, "_pools", {})
+    seen: set[threading.Thread] = set()
+
+    def work(item: int, own: Workspace) -> None:
+        seen.add(threading.current_thread())
+        time.sleep(0.001)
+
     for _ in range(20):
-        side_by_side(lambda item, own: None, range(9))
-    assert threading.active_count() <= before + 3
+        side_by_side(work, range(9))
+    assert 1 < len(seen) <= 1 + 3
 
 
 def test_one_item_has_all_cores_and_none_is_no_trouble(monkeypatch):
