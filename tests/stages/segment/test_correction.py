@@ -127,6 +127,16 @@ def test_lost_is_what_lies_beside_a_bone_and_is_likely_the_persons_not_a_strange
     assert not find_lost(outline, probability, distance_to_bones((200, 200), xy, 0 * score)).any()
 
 
+def test_a_strangers_wrist_beside_a_bone_is_not_lost_but_a_foot_on_its_bone_is_though_neither_touches_the_outline():
+    xy, score = np.zeros((133, 2)), np.zeros(133)
+    xy[[13, 15]], score[[13, 15]] = [(60, 100), (60, 180)], 1.0  # a shin
+    outline, probability = np.zeros((200, 200), bool), np.zeros((200, 200), np.uint8)
+    outline[90:130, 50:71] = True
+    probability[165:185, 55:66] = probability[100:125, 75:85] = 255
+    lost = find_lost(outline, probability, distance_to_bones((200, 200), xy, score))
+    assert lost[165:185, 55:66].all() and np.count_nonzero(lost) == 20 * 11
+
+
 def test_a_plate_is_fitted_to_the_exposure_and_one_of_another_place_is_refused():
     truth = comb()
     image = painted(truth, wall())
