@@ -119,8 +119,8 @@ def find_clothing(labels: np.ndarray, gap: np.ndarray, bones: np.ndarray, likely
 
 def find_lost(outline: np.ndarray, probability: np.ndarray, bones: np.ndarray) -> np.ndarray:
     """(H, W) bool, what lies beside a bone and is more likely the person than not, though the outline leaves it out: of trousers as
-    green as the carpet GrabCut leaves half a calf, with edges that lie deep inside. What neither touches the outline nor lies on a bone
-    is somebody else's.
+    green as the carpet GrabCut leaves half a calf, with edges that lie deep inside. What neither touches the outline nor lies on a
+    bone is somebody else's.
 
     outline: (H, W) bool; probability: (H, W) uint8, the network's; bones: (H, W) px, from the bones.
     """
