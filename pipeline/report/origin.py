@@ -15,8 +15,10 @@ from gsac.pipeline.report.results import Results
 HEAD_BYTES = 4096
 """The first part of the page, which holds the marks."""
 MARKS = {name: re.compile(f'<meta name="gsac-{name}" content="([^"]*)">') for name in ("drawn-from", "shows", "verdict", "grade")}
-ROW_PARTS = ("name", "key", "inputs", "outputs", "warnings", "findings", "notes", "error", "stale_reason")
-"""What a row of run.json gives to the page beside its times, which belong to the last command."""
+ROW_PARTS = ("name", "key", "seconds", "cpu_seconds", "peak_rss_mb", "timings", "inputs", "outputs", "warnings", "findings",
+             "notes", "error", "stale_reason")
+"""What a row of run.json gives to the page beside its status, which belongs to the last command: a run with nothing to do draws
+nothing."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """report.html is drawn anew exactly when what it was drawn from differs, and never loses parts."""
 
+import json
 import shutil
 import signal
 import subprocess
@@ -37,6 +38,15 @@ def drawn_again(toy, *arguments):
 def test_a_run_with_nothing_to_do_draws_nothing(toy):
     toy.ran()
     assert not drawn_again(toy)
+
+
+def test_a_stage_that_ran_again_shows_its_new_time_in_the_report_although_its_result_is_the_same(toy):
+    toy.ran()
+    run = json.loads((toy.out / "run.json").read_text())
+    run["stages"][-1]["seconds"] = 61
+    (toy.out / "run.json").write_text(json.dumps(run))
+    assert toy.gsac("report", toy.out).code == 0 and "1 min 01 s" in page(toy).read_text()
+    assert drawn_again(toy, "--force", "join") and "1 min 01 s" not in page(toy).read_text()
 
 
 def test_going_back_to_a_parameter_that_was_computed_before_draws_the_report_of_that_parameter(toy):
