@@ -18,10 +18,17 @@ CRF_VP9 = 24
 """libvpx's: 0 is lossless, 63 the worst."""
 BT709 = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
 TO_BT709 = ["-vf", "scale=out_color_matrix=bt709:out_range=tv"]
+
+
+def h264(crf: int = CRF, preset: str = "medium", threads: int = 0) -> list[str]:
+    """ffmpeg's options of an H.264 file in an MP4. threads: 0 takes all cores; their number is seen in the bytes."""
+    return [*TO_BT709, "-c:v", "libx264", "-preset", preset, "-threads", str(threads), "-crf", str(crf), "-pix_fmt", "yuv420p",
+            *BT709, "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart", "-f", "mp4"]
+
+
 PALETTE = "split[a][b];[a]palettegen=reserve_transparent=1[p];[b][p]paletteuse=dither=sierra2_4a:alpha_threshold=128"
 ENCODERS = {
-    ".mp4": lambda alpha: [*TO_BT709, "-c:v", "libx264", "-preset", "medium", "-crf", str(CRF), "-pix_fmt", "yuv420p", *BT709,
-                           "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart", "-f", "mp4"],
+    ".mp4": lambda alpha: h264(),
     ".webm": lambda alpha: [*TO_BT709, "-c:v", "libvpx-vp9", "-crf", str(CRF_VP9), "-b:v", "0", "-cpu-used", "4", "-row-mt", "1",
                             "-auto-alt-ref", "0", "-pix_fmt", "yuva420p" if alpha else "yuv420p", *BT709,
                             "-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "webm"],
@@ -40,11 +47,13 @@ class VideoError(Exception):
 
 
 class Video:
-    """`with Video(path, 640, 480, 30) as video: video.add(frame)`, by the suffix of the path, one of ENCODERS. Width and
-    height are even, px. Where the block raises, no file is left."""
+    """`with Video(path, 640, 480, 30) as video: video.add(frame)`. Width and height are even, px. Where the block raises, no file
+    is left."""
 
-    def __init__(self, path: Path, width: int, height: int, fps: float, alpha: bool = False):
+    def __init__(self, path: Path, width: int, height: int, fps: float, alpha: bool = False, encoder: list[str] | None = None):
+        """encoder: ffmpeg's options; None: by the suffix of the path, one of ENCODERS."""
         self.path, self.size, self.fps, self.alpha = Path(path), (width, height), fps, alpha
+        self.encoder = encoder or ENCODERS[self.path.suffix.lower()](alpha)
 
     def __enter__(self) -> Video:
         width, height = self.size
@@ -52,8 +61,8 @@ class Video:
         self.log = tempfile.TemporaryFile()
         self.process = subprocess.Popen(
             [ffmpeg_program(), "-y", "-nostdin", "-loglevel", "error", "-f", "rawvideo",
-             "-pix_fmt", "rgba" if self.alpha else "rgb24", "-s", f"{width}x{height}", "-r", f"{self.fps:g}", "-i", "pipe:0",
-             *ENCODERS[self.path.suffix.lower()](self.alpha), f"file:{self.part}"],
+             "-pix_fmt", "rgba" if self.alpha else "rgb24", "-s", f"{width}x{height}", "-r", str(self.fps), "-i", "pipe:0",
+             *self.encoder, f"file:{self.part}"],
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self.log)
         return self
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +16,10 @@ from gsac.avatar import wholebody
 from gsac.avatar.artifacts import BODY_SHAPES, write_arrays
 from gsac.avatar.body import BodyParams
 from gsac.avatar.camera import Camera
-from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.avatar.frame_files import write_frame, write_image
 from gsac.avatar.joints import INDEX, LEFT_HAND, RIGHT_HAND, WRISTS, J
 from gsac.avatar.skinning import joint_transforms
+from gsac.avatar.video import Video, h264
 from gsac.avatar.zbuffer import visible_points
 from gsac.turntable.appearance import make_appearance
 from gsac.turntable.behaviour import behave
@@ -76,24 +76,25 @@ def make_clip(out_dir: Path | str, options: TurntableOptions | None = None,
     studio = make_studio(person, options)
     params = place_person(person, motion, studio.view)
     truth = TruthRecorder(person, motion, params, studio.view, options.drawn)
-    video = VideoWriter(out / "clip.mp4", options) if turn else None
-    try:
+    with open_video(out / "clip.mp4", options) if turn else nullcontext() as video:
         for t in range(options.frames):
             bare, drawn, joints = pose_person(person, params, t, motion.covered[t])
             picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
             frame = develop(picture, options, t, noise=turn)
             write_image(out / "mask" / f"{t:06d}.png", picture.mask)
-            if video:
+            if video is not None:
                 video.add(frame)
             if not turn or options.lossless:
                 write_frame(out / "frames" / f"{t:06d}.png", frame)
             truth.add(t, bare, drawn, joints, picture)
             progress(t + 1, options.frames, "frames")
-    finally:
-        if video:
-            video.close()
     write_arrays(out / "truth.npz", **truth.arrays(options))
     return out / ("clip.mp4" if turn else "frames")
+
+
+def open_video(path: Path, options: TurntableOptions) -> Video:
+    """The clip's H.264 file, of the same bytes whatever the machine's number of cores. Raises VideoError."""
+    return Video(path, *options.size, options.fps, encoder=h264(options.crf, "fast", threads=1))
 
 
 def make_view(person: Person, options: TurntableOptions, rng: np.random.Generator) -> Viewpoint:
@@ -225,28 +226,3 @@ class TruthRecorder:
         out |= {"vertices": self.vertices} if options.vertices else {}
         surface = {"drawn": self.drawn, "drawn_faces": self.person.faces.astype(np.int32), "drawn_material": self.person.material}
         return out | (surface if self.drawn is not None else {})
-
-
-class VideoWriter:
-    """An H.264 file, encoded by imageio-ffmpeg's program."""
-
-    def __init__(self, path: Path, options: TurntableOptions):
-        width, height = options.size
-        self.process = subprocess.Popen(
-            [ffmpeg_program(), "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
-             "-s", f"{width}x{height}", "-r", str(options.fps), "-i", "-",
-             "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-c:v", "libx264", "-preset", "fast", "-threads", "1",
-             "-crf", str(options.crf), "-pix_fmt", "yuv420p", "-colorspace", "bt709", "-color_primaries", "bt709",
-             "-color_trc", "bt709", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-movflags", "+faststart",
-             str(path)],
-            stdin=subprocess.PIPE, stderr=subprocess.PIPE)
-
-    def add(self, frame: np.ndarray) -> None:
-        """frame: (H, W, 3) uint8 RGB."""
-        self.process.stdin.write(frame.tobytes())
-
-    def close(self) -> None:
-        """Finishes the file; raises OSError with ffmpeg's words if it failed."""
-        _, said = self.process.communicate()
-        if self.process.returncode:
-            raise OSError(f"ffmpeg failed: {said.decode(errors='replace').strip()}")

@@ -25,7 +25,7 @@ from gsac.benchmarks.face.drawing import SMALLEST, Head, Portrait
 from gsac.benchmarks.perception import video_frames
 from gsac.stages.face.config import ATTENTIVE, PLAIN
 from gsac.stages.face.landmarks import TwoMeshes, read_averaged
-from gsac.turntable.clip import FEET, VideoWriter, develop, make_studio, make_view, place_person, pose_person, studio_rng
+from gsac.turntable.clip import FEET, develop, make_studio, make_view, open_video, place_person, pose_person, studio_rng
 from gsac.turntable.motion import make_motion
 from gsac.turntable.options import TurntableOptions
 from gsac.turntable.person import Person, make_person
@@ -164,11 +164,10 @@ class Scene:
         """Writes the window as a video."""
         studio = make_studio(self.person, self.options, self.window)
         options = dataclasses.replace(self.options, width=self.window.width, height=self.window.height)
-        video = VideoWriter(clip, options)
-        for t, (_, drawn, joints) in enumerate(self.frames):
-            picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
-            video.add(develop(picture, options, t, noise=True))
-        video.close()
+        with open_video(clip, options) as video:
+            for t, (_, drawn, joints) in enumerate(self.frames):
+                picture = studio.draw(drawn, studio.view.to_world(joints[FEET]))
+                video.add(develop(picture, options, t, noise=True))
 
     def locate(self, landmarks: np.ndarray) -> np.ndarray:
         """Places (468, 3) m on the template's skin, median over frontal frames, NaN without one.

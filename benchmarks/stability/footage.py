@@ -11,7 +11,7 @@ import numpy as np
 from gsac.avatar.ffmpeg import ffmpeg_program
 from gsac.benchmarks.stability.fault import Fault, Origin, pick_some
 from gsac.benchmarks.stability.take import FPS, Take
-from gsac.turntable.clip import VideoWriter
+from gsac.turntable.clip import open_video
 from gsac.turntable.options import TurntableOptions
 
 DEEP = (("yuv420p10le", "bt709", "bt709", "bt709"), ("yuv422p10le", "bt709", "bt709", "bt709"),
@@ -52,10 +52,9 @@ class Film:
         height, width = stored[0].shape[:2]
         plain = path.with_suffix(".plain.mp4")
         path.parent.mkdir(parents=True, exist_ok=True)
-        video = VideoWriter(plain, TurntableOptions(height=height, width=width, fps=self.rate, crf=4))
-        for frame in stored:
-            video.add(np.ascontiguousarray(frame))
-        video.close()
+        with open_video(plain, TurntableOptions(height=height, width=width, fps=self.rate, crf=4)) as video:
+            for frame in stored:
+                video.add(frame)
         before, after = [], ["-c", "copy"]
         if self.rotation:
             before += ["-display_rotation", str(self.rotation)]

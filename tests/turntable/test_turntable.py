@@ -149,6 +149,15 @@ def test_equal_options_give_equal_files_and_another_seed_another_person(made, tm
     assert not np.allclose(read_arrays(tmp_path / "other" / "truth.npz")["betas"], truth["betas"])
 
 
+def test_a_clip_that_was_stopped_leaves_no_half_video(tmp_path):
+    def stop(done, total, what):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        clip.make_clip(tmp_path, dataclasses.replace(SMALL, frames=2, height=64), stop)
+    assert not list(tmp_path.glob("*clip.mp4*"))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("hand", [h for h in get_args(HiddenHand) if h != "none"])
 def test_a_hidden_hand_is_flagged_while_it_is_away(hand, tmp_path):
