@@ -12,6 +12,7 @@ from gsac.pipeline.cost_forecast import Forecaster
 from gsac.pipeline.executors.executor import ClipJob
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import KeysOfOneMoment
+from gsac.pipeline.other_clip import make_way
 from gsac.pipeline.plan import Reason, StagePlan, plan_stages
 from gsac.pipeline.project import Project
 from gsac.pipeline.run import ClipRun, Options
@@ -37,9 +38,9 @@ class ClipPlan:
     peak_mb: float = 0.0
     """Memory of the largest of them."""
     digest: str = ""
-    """Of the clip; empty where it cannot be read."""
+    """Of the clip; empty where it cannot run."""
     error: str = ""
-    """Why it cannot be read."""
+    """Why it cannot run: the clip cannot be read, or the folder is another's."""
     before_gpu: str = ""
     """Last stage before those that a GPU computes; empty where none of those is due."""
 
@@ -62,8 +63,9 @@ class ClipPlan:
 class BatchPlanner:
     """Plans clips over one store, with one set of parameters."""
 
-    def __init__(self, project: Project, configs: dict[str, Any], store: Store, options: Options):
-        self.keys, self.store = KeysOfOneMoment(project, configs, store), store
+    def __init__(self, project: Project, configs: dict[str, Any], store: Store, options: Options, replace: bool = False):
+        """replace: whether other clips' avatars in the folders give way."""
+        self.keys, self.store, self._replace = KeysOfOneMoment(project, configs, store), store, replace
         self._graph, self._force = project.graph, options.force
         nowhere = RunFolder(store.root)  # only asked for the stages
         self.steps = ClipRun(project, configs, store, nowhere, keys=self.keys).select(options)
@@ -72,13 +74,16 @@ class BatchPlanner:
         self._peak_mb = functools.cache(lambda name: _peak_mb(name, store))
 
     def plan_all(self, jobs: Iterable[ClipJob]) -> list[ClipPlan]:
-        """Plans in the order of the jobs. A clip that cannot be read is planned as such: its run says so, too."""
+        """Plans in the order of the jobs. A clip that cannot run is planned as such: its run says so, too."""
         return [self.plan(job) for job in jobs]
 
     def plan(self, job: ClipJob) -> ClipPlan:
         """What the run of one clip would do."""
         try:
             digest = source_digest(job.clip, self.store)
+            folder, clip = RunFolder(job.out), job.clip.resolve()
+            folder.refuse_foreign(clip, self.keys.project)
+            make_way(folder, clip, self.store, self._replace)
         except BadInput as error:
             return ClipPlan(job, error=str(error))
         plans = plan_stages(self._graph, self.steps, {CLIP: digest}, self._plan)

@@ -98,7 +98,7 @@ def run(arguments: argparse.Namespace, reporter: PlainReporter, journal: Journal
     configs = resolve_quality(arguments.quality, project, arguments.params, arguments.set, values_of_person(arguments, project))
     options = Options(arguments.until, arguments.start, tuple(arguments.force), arguments.quality, arguments.anyway)
     store = open_store(journal)
-    planner = BatchPlanner(project, configs, store, options)
+    planner = BatchPlanner(project, configs, store, options, arguments.replace)
     planner.keys.check(planner.steps)  # one error now, not one a clip
     jobs = make_jobs(find_clips(arguments.source), arguments.out, forwarded_arguments(arguments))
     refuse_others_events(arguments.out)
@@ -207,7 +207,7 @@ def foretell(plans: list[ClipPlan], kept: int, workers: int | None) -> str:
     parts = [counted(len(plans) + kept, "clip")]
     parts += [f"{unchanged} unchanged"] if unchanged else []
     parts += [f"{kept} left as they are"] if kept else []
-    parts += [f"{broken} cannot be read"] if (broken := sum(bool(plan.error) for plan in plans)) else []
+    parts += [f"{refused} cannot run"] if (refused := sum(bool(plan.error) for plan in plans)) else []
     if not due:
         return ", ".join([*parts, "nothing to do"])
     at_once = min(workers or 1, len(due))

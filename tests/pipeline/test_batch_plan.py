@@ -56,6 +56,20 @@ def test_a_dry_run_says_what_each_clip_needs_and_runs_nothing(toy, clips, out):
     assert len(toy.runs) == ran and not (out / "batch.json").exists()
 
 
+def test_a_dry_run_tells_which_clips_the_run_would_refuse(toy, clips, out):
+    toy.gsac("run", toy.clip, "--out", out / "one-avatar")
+    (out / "two-avatar").mkdir()
+    (out / "two-avatar" / "report.html").write_text("mine")
+    plan, replaced, done = (toy.gsac("batch", clips, "--out", out, *words) for words in (
+        ["--dry-run"], ["--dry-run", "--replace"], ["--json"]))
+    assert f"one.mp4: {out / 'one-avatar'} holds the avatar of {toy.clip}; give another --out" in plan.err
+    assert f"two.mp4: {out / 'two-avatar'} is not the folder of a run and holds report.html" in plan.err
+    assert "three.mp4: cut to join" in plan.err and "3 clips, 2 cannot run, 1 to do" in plan.err
+    assert "one.mp4: cut to join" in replaced.err and "holds report.html" in replaced.err
+    assert statuses(done) == {"one": "failed", "two": "failed", "three": "done"}
+    assert all(row["error"] in plan.err for row in done.json["clips"] if row["status"] == "failed")
+
+
 def test_a_killed_batch_goes_on_with_its_own_words_and_leaves_what_has_ended(toy, clips, out):
     process = toy.start("batch", clips, "--out", out, "-j", "1", "--set", "join.pause_s=3", "--until", "join")
     toy.wait_for(lambda: ended(out) == ["done"] and toy.runs.count("cut") == 2)
