@@ -164,7 +164,11 @@ class ClipRun:
 
     def plan(self, clip: Path, options: Options) -> list[StagePlan]:
         """What would run and why, as far as it is known before anything runs."""
-        return self._plan_all(self.select(options), {CLIP: source_digest(clip, self.store)}, options)
+        return self.plan_of(source_digest(clip, self.store), options)
+
+    def plan_of(self, digest: str, options: Options) -> list[StagePlan]:
+        """The same of a clip by its tree digest, be it there or gone."""
+        return self._plan_all(self.select(options), {CLIP: digest}, options)
 
     def _plan_all(self, steps: list[str], digests: dict[str, str], options: Options) -> list[StagePlan]:
         return plan_stages(self.graph, steps, digests,

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 
 from gsac.cache.key import KeyParts
-from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, plan_run
+from gsac.pipeline.commands.options import add_json, add_params, add_run_folder, answer_reporter, open_clip_run
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.outcomes import ExitCode
+from gsac.pipeline.run import Options
 
 
 def declare(command: argparse.ArgumentParser) -> None:
@@ -21,7 +22,8 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 def do(arguments: argparse.Namespace) -> ExitCode:
     with answer_reporter(arguments) as reporter:
-        plan = plan_run(arguments, reporter, until=arguments.stage)[1][-1]
+        clip_run = open_clip_run(arguments, reporter)
+        plan = clip_run.plan(clip_run.folder.require_clip(), Options(until=arguments.stage))[-1]
         reporter.note(f"{plan.stage}: {plan.reason.value}")
         if not plan.changes:
             reporter.note(f"  {plan.sentence}")

@@ -16,12 +16,11 @@ from gsac.cache.half_made import sweep, temporary_folder
 from gsac.cache.store import Store
 from gsac.pipeline.keys import BODY
 from gsac.pipeline.params import Values, resolve
-from gsac.pipeline.plan import StagePlan
 from gsac.pipeline.project import Project
 from gsac.pipeline.quality import QUALITIES, STANDARD
 from gsac.pipeline.reporter import PlainReporter, Speaker, open_reporter
 from gsac.pipeline.rows import stale_reasons
-from gsac.pipeline.run import ClipRun, Options
+from gsac.pipeline.run import ClipRun
 from gsac.pipeline.run_folder import OWN_STORE, RunFolder
 from gsac.stages.contract import BadInput
 
@@ -156,10 +155,7 @@ def open_run_folder(
     return run_folder, project, resolve(project, file, arguments.set, only)
 
 
-def plan_run(arguments: argparse.Namespace, reporter: PlainReporter, until: str | None = None) -> tuple[ClipRun, list[StagePlan]]:
-    """The run in `arguments.folder` as it would go now, up to one stage; nothing runs."""
+def open_clip_run(arguments: argparse.Namespace, reporter: PlainReporter) -> ClipRun:
+    """The run in `arguments.folder` as it would go now; nothing runs."""
     folder, project, configs = open_run_folder(arguments, arguments.folder)
-    if until is not None:
-        project.graph.step(until)
-    clip_run = ClipRun(project, configs, open_store_of(folder, reporter), folder)
-    return clip_run, clip_run.plan(folder.require_clip(), Options(until=until))
+    return ClipRun(project, configs, open_store_of(folder, reporter), folder)

@@ -35,11 +35,16 @@ def test_status_takes_a_copy_for_the_real_thing(toy):
     assert toy.gsac("status", cwd=toy.out).code == 0
 
 
-def test_status_names_a_clip_that_is_gone(toy):
+def test_status_names_a_clip_that_is_gone_and_tells_the_stages_of_the_clip_that_was(inside, toy):
     toy.ran()
     toy.clip.unlink()
-    done = toy.gsac("status", toy.out)
-    assert done.code == 2 and "clip.mp4, which is gone" in done.err
+    done = inside(toy, "status", toy.out, "--set", "right.keep=7", "--json")
+    assert done.code == 2 and "clip.mp4, which is gone" in done.err and "which is gone" in done.json["error"]
+    assert [row["reason"] for row in done.json["stages"]] == ["up to date", "up to date", "parameter changed", "upstream"]
+    assert inside(toy, "status", toy.out).out.count("up to date") == 4
+    (toy.out / "run.json").unlink()
+    done = inside(toy, "status", toy.out)
+    assert done.code == 2 and "clip.mp4, which is gone" in done.err and not done.out
 
 
 def test_explain_names_every_part_of_the_key_that_changed(toy):
