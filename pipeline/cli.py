@@ -9,9 +9,10 @@ import argparse
 import os
 import sys
 from functools import partial
-from typing import Any, NoReturn
+from typing import Any
 
 from gsac.pipeline import commands
+from gsac.pipeline.command_parser import CommandParser
 from gsac.pipeline.errors import attached_summary, exit_code, sentence
 from gsac.pipeline.interrupts import interrupts_heard
 from gsac.pipeline.json_output import emit
@@ -19,7 +20,6 @@ from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.reporter import Verbosity
 from gsac.pipeline.versions import package_version
 from gsac.pipeline.wrapping import fit
-from gsac.stages.contract import BadInput, did_you_mean
 
 RUNNING = ("run", "demo", "batch", "stage", "bench")
 """Commands that run stages."""
@@ -57,7 +57,7 @@ def _execute(argv: list[str]) -> ExitCode:
 
 def make_parser(argv: list[str]) -> argparse.ArgumentParser:
     """The parser of this command line: all commands by name, and the arguments of the one that was typed."""
-    parser = _Parser(
+    parser = CommandParser(
         prog="gsac", description="One phone clip of a turning person in, an animatable Gaussian avatar out.")
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     _add_verbosity(parser, default=Verbosity.NORMAL)
@@ -84,28 +84,6 @@ def _add_verbosity(parser: argparse.ArgumentParser, default: Any = argparse.SUPP
     for letter, verbosity in (("q", Verbosity.QUIET), ("v", Verbosity.VERBOSE)):
         both.add_argument(f"-{letter}", f"--{verbosity.value}", dest="verbosity", action="store_const", const=verbosity,
                           default=default, help=verbosity.sentence)
-
-
-class _Parser(argparse.ArgumentParser):
-    """Of the program and, by argparse's own way, of each command: what is wrong is one sentence, and an option is its whole name,
-    since the beginning of one may be that of two in the next version."""
-
-    def __init__(self, *given: Any, **named: Any):
-        super().__init__(*given, allow_abbrev=False, **named)
-
-    def error(self, message: str) -> NoReturn:
-        raise BadInput(f"{message}; `{self.prog} --help` tells what is taken")
-
-    def parse_known_args(self, *given: Any) -> Any:
-        found, unknown = super().parse_known_args(*given)
-        option = next((word.partition("=")[0] for word in unknown if word.startswith("-")), None)
-        if option is not None:
-            known = [name[2:] for name in self._option_string_actions if name.startswith("--")]
-            near = did_you_mean(option.lstrip("-"), known, "--")
-            raise BadInput(f"unknown option {option}{near}; `{self.prog} --help` lists them")
-        if unknown:
-            raise BadInput(f"{unknown[0]} is one word too many; `{self.prog} --help` tells what is taken")
-        return found, unknown
 
 
 class _Version(argparse.Action):

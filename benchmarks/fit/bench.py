@@ -8,8 +8,9 @@ own detections, filled, and then fitted.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
+
+from gsac.pipeline.command_parser import CommandParser
 
 SEEDS = (31, 32)
 """Not 11, 12 and 41 to 44: the detector's offsets were once measured on those."""
@@ -17,8 +18,8 @@ BARE_SEEDS = (33,)
 GAP_SEEDS = (1, 2, 3)
 
 
-def parser() -> argparse.ArgumentParser:
-    out = argparse.ArgumentParser(prog="gsac bench fit", description="The body fit against truth: error and seconds, both methods.")
+def parser() -> CommandParser:
+    out = CommandParser(prog="gsac bench fit", description="The body fit against truth: error and seconds, both methods.")
     out.add_argument("--seeds", type=int, nargs="*", default=list(SEEDS), help="turntable clips (default: 31 32)")
     out.add_argument("--bare-seeds", type=int, nargs="*", default=list(BARE_SEEDS),
                      help="turntable clips without clothes (default: 33)")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
+from gsac.pipeline.command_parser import CommandParser
 from gsac.pipeline.cost_model import MODELS, Cost, Model
 from gsac.pipeline.footage import Footage, footage_of_result
 from gsac.pipeline.project import Project
@@ -34,7 +34,7 @@ class Took(NamedTuple):
 
 
 def main(argv: list[str]) -> None:
-    parser = argparse.ArgumentParser(prog="gsac bench forecast", description=__doc__)
+    parser = CommandParser(prog="gsac bench forecast", description=__doc__)
     parser.add_argument("runs", type=Path, nargs="+", metavar="DIR",
                         help="folders of `gsac run`, computed on the cost model's machine with nothing else at work")
     options = parser.parse_args(argv)

@@ -8,14 +8,15 @@ its ends, and every method fills the same windows. --runs does the same with rea
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
+
+from gsac.pipeline.command_parser import CommandParser
 
 SEEDS = (1, 2, 3, 4, 5)
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="gsac bench handgap", description=__doc__.splitlines()[0])
+    parser = CommandParser(prog="gsac bench handgap", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--out", type=Path, default=Path("bench-handgap"), metavar="DIR", help="default: ./bench-handgap")
     parser.add_argument("--seeds", type=int, nargs="+", default=list(SEEDS))
     parser.add_argument("--runs", type=Path, nargs="*", default=[], metavar="RUN TRUTH", help="real detections, by pairs")

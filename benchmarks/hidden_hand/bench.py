@@ -7,9 +7,10 @@ each time.
 
 from __future__ import annotations
 
-import argparse
 import csv
 from pathlib import Path
+
+from gsac.pipeline.command_parser import CommandParser
 
 LOOKED_AT = ("41:left:17", "101:left:8", "102:right:24", "103:left:17", "201:left:24", "11:left:36", "302:right:24")
 """People by whom constants of the fit were set, or who were looked at for the causes of their errors."""
@@ -19,8 +20,7 @@ CLEAN = ("201", "305")
 
 
 def main(argv: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="gsac bench hidden-hand",
-                                     description="The fit's error of arms whose hand lies behind the back.")
+    parser = CommandParser(prog="gsac bench hidden-hand", description="The fit's error of arms whose hand lies behind the back.")
     parser.add_argument("--cases", nargs="+", default=[*LOOKED_AT, *APART, *CLEAN], metavar="CASE",
                         help="SEED:SIDE:FRAMES, or SEED for a clean turn")
     parser.add_argument("--out", type=Path, default=Path("bench-hidden-hand"), metavar="DIR", help="default: ./bench-hidden-hand")

@@ -9,11 +9,11 @@ its own. LPIPS is a dash without its weights (`gsac models add`).
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 from gsac.benchmarks import training
 from gsac.benchmarks.clip_runs import render_clip
+from gsac.pipeline.command_parser import CommandParser
 
 GIVEN = "poses given"
 """The row of the truth's body in place of the fitted one."""
@@ -24,8 +24,8 @@ HIDDEN = ("left_front", "right_back")
 """The turntable's `hidden_hand` of even and of odd seeds, so that a part that runs on its own (`--beside`) has the same clips."""
 
 
-def parser() -> argparse.ArgumentParser:
-    out = argparse.ArgumentParser(prog="gsac bench paper-table", description=__doc__.splitlines()[0])
+def parser() -> CommandParser:
+    out = CommandParser(prog="gsac bench paper-table", description=(__doc__ or "").partition("\n")[0])
     out.add_argument("--seeds", type=int, nargs="*", default=[41, 42], metavar="N", help="clips to render (default: 41 42)")
     out.add_argument("--frames", type=int, default=60, help="frames of a clip (default: 60)")
     out.add_argument("--recipe", default="fast", choices=["fast", "paper"], help="recipe of the trainings (default: fast)")

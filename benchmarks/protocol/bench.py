@@ -7,12 +7,12 @@ the trainings with several seeds. LPIPS is a dash without its weights (`gsac mod
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 
 from gsac.benchmarks import training
 from gsac.benchmarks.protocol.protocols import PROTOCOLS, Protocol
+from gsac.pipeline.command_parser import CommandParser
 from gsac.pipeline.data_sets.write import CAMERAS, SPLIT
 from gsac.pipeline.model_check import check_model
 from gsac.stages.contract import BadInput
@@ -20,8 +20,8 @@ from gsac.stages.contract import BadInput
 GIVEN = "\nAll poses, of the test frames too, are those that came with the data."
 
 
-def parser() -> argparse.ArgumentParser:
-    out = argparse.ArgumentParser(prog="gsac bench protocol", description=(__doc__ or "").partition("\n")[0])
+def parser() -> CommandParser:
+    out = CommandParser(prog="gsac bench protocol", description=(__doc__ or "").partition("\n")[0])
     out.add_argument("name", choices=sorted(PROTOCOLS), metavar="NAME", help=f"one of: {', '.join(sorted(PROTOCOLS))}")
     out.add_argument("clips", type=Path, nargs="+", metavar="DIR", help="folders that `gsac data import` wrote, one a subject")
     out.add_argument("--poses", default="fitted", choices=["fitted", "given"],

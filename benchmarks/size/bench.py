@@ -5,17 +5,17 @@ The line has all sizes that `train.gaussians: auto` tries; crosses are trainings
 
 from __future__ import annotations
 
-import argparse
 import csv
 from pathlib import Path
 
 from gsac.benchmarks import training
+from gsac.pipeline.command_parser import CommandParser
 
 FIELDS = ("n_gaussians", "psnr_fg_mean", "psnr_fg_error", "detail_mean", "detail_error", "chosen")
 
 
-def parser() -> argparse.ArgumentParser:
-    out = argparse.ArgumentParser(prog="gsac bench size", description=__doc__.splitlines()[0])
+def parser() -> CommandParser:
+    out = CommandParser(prog="gsac bench size", description=(__doc__ or "").partition("\n")[0])
     training.declare(out, "size")
     out.add_argument("--scratch", type=int, nargs="*", default=[], metavar="N", help="also train these numbers from the start")
     out.add_argument("--steps", type=int, default=None, help="steps of a training (default: the recipe's)")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from gsac.benchmarks import training
 from gsac.benchmarks.speed_accuracy.trial import PAPER, WAYS, Trial
+from gsac.pipeline.command_parser import CommandParser
 from gsac.pipeline.journal import Journal, plain_journal
 from gsac.pipeline.quality import QUALITIES, STANDARD
 
@@ -19,8 +20,8 @@ CURVE = 6
 """Judged checkpoints of a training with seed 0."""
 
 
-def parser() -> argparse.ArgumentParser:
-    out = argparse.ArgumentParser(prog="gsac bench speed-accuracy", description=__doc__.splitlines()[0])
+def parser() -> CommandParser:
+    out = CommandParser(prog="gsac bench speed-accuracy", description=(__doc__ or "").partition("\n")[0])
     training.declare(out, "speed-accuracy")
     out.add_argument("--ways", nargs="+", default=list(WAYS), choices=WAYS,
                      help="presets of --quality, or recipe paper (default: all)")

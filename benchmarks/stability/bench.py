@@ -13,6 +13,8 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gsac.pipeline.command_parser import CommandParser
+
 if TYPE_CHECKING:
     from gsac.benchmarks.stability.trial import Task
     from gsac.pipeline.journal import Journal
@@ -23,11 +25,11 @@ CPU_SECONDS = {"default": 0.3, "paper": 1.7}
 """Method -> CPU seconds of one frame of a trial, 20 frames of 480 px, mean of a few faults."""
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> CommandParser:
     from gsac.benchmarks.stability.faults import FAULTS
     from gsac.benchmarks.stability.trial import DEFAULT, METHODS
 
-    out = argparse.ArgumentParser(prog="gsac bench stability", description=(__doc__ or "").partition("\n")[0])
+    out = CommandParser(prog="gsac bench stability", description=(__doc__ or "").partition("\n")[0])
     out.add_argument("--fault", nargs="+", default=None, choices=list(FAULTS), metavar="NAME", help=f"of {', '.join(FAULTS)}")
     out.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2], metavar="N", help="default: 0 1 2")
     out.add_argument("--severities", type=int, nargs="+", default=None, choices=range(1, 6), metavar="N", help="default: 1 to 5")

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gsac.avatar.gsac_file.write import avatar_bytes
+from gsac.pipeline.command_parser import CommandParser
 from gsac.stages.contract import BadInput, StageError
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ CAMERA = {"fov": 30.0, "dist": 3.8, "bg": "3a6080"}
 """Parameters of both pages: degrees, m, colour."""
 
 
-def parser() -> argparse.ArgumentParser:
-    out = argparse.ArgumentParser(prog="gsac bench viewer", description=__doc__.splitlines()[0])
+def parser() -> CommandParser:
+    out = CommandParser(prog="gsac bench viewer", description=(__doc__ or "").partition("\n")[0])
     out.add_argument("--out", type=Path, default=Path("bench-viewer"), metavar="DIR", help="default: bench-viewer")
     out.add_argument("--avatar", type=Path, metavar="FILE", help="an avatar.gsac; default: a made-up person")
     out.add_argument("--gaussians", type=int, default=6000, metavar="N", help="of the made-up person; default: 6000")

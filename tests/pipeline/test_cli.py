@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from gsac.benchmarks import command
 from gsac.pipeline import commands
 from gsac.pipeline.cli import execute
 from gsac.pipeline.outcomes import ExitCode
@@ -95,6 +96,12 @@ def test_a_misspelt_option_is_named_alone_with_the_nearest_one_of_its_command(ca
     assert execute(arguments) == ExitCode.USAGE
     said = capsys.readouterr().err
     assert words in said and "usage:" not in said and "draft" not in said
+
+
+@pytest.mark.parametrize("name", command.names())
+def test_a_benchmark_takes_an_option_by_its_whole_name_alone(capsys, name):
+    assert execute(["bench", name, "--hel"]) == ExitCode.USAGE
+    assert f"`gsac bench {name} --help`" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
