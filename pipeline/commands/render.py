@@ -78,7 +78,12 @@ def do(arguments: argparse.Namespace) -> ExitCode:
                        "or a folder for PNG pictures")
     with progress_reporter(arguments) as reporter:
         warn_stale(folder_around(file), reporter, EXPORT)
-        frames, (width, height), seconds = film(file, arguments, out, size, background, floor, Journal(reporter.take))
+        began, journal = time.monotonic(), Journal(reporter.take)
+        avatar, motion = read_avatar(file, arguments.motion)
+        journal.starts("render", f"{file.name} to {out}")
+        frames, (width, height) = film(avatar, motion, arguments, out, size, background, floor, journal)
+        seconds = time.monotonic() - began
+        journal.finishes("render", seconds)
     if arguments.json:
         emit({"stages": [{"name": "render", "status": Outcome.RAN.value, "seconds": seconds, "key": None}],
               "outputs": {"video": str(out)},
@@ -89,23 +94,28 @@ def do(arguments: argparse.Namespace) -> ExitCode:
     return ExitCode.OK
 
 
-def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, int] | None, background: np.ndarray | None,
-         floor: np.ndarray | None, journal: Journal) -> tuple[int, tuple[int, int], float]:
-    """Writes the video. Returns the number of its frames, their width and height, and the seconds that it took.
+def read_avatar(file: Path, motion: str | None) -> tuple[RiggedAvatar, Motion | None]:
+    """The avatar and how it moves, before what draws it is loaded. motion: as for `find_motion`. BadInput names a damaged file."""
+    from gsac.avatar.artifacts import ArtifactError
+    from gsac.avatar.gsac_file.rigged import RiggedAvatar
+
+    try:
+        avatar = RiggedAvatar.read(file)
+        return avatar, find_motion(motion, avatar)
+    except ArtifactError as e:
+        raise BadInput(str(e)) from e
+
+
+def film(avatar: RiggedAvatar, motion: Motion | None, arguments: argparse.Namespace, out: Path, size: tuple[int, int] | None,
+         background: np.ndarray | None, floor: np.ndarray | None, journal: Journal) -> tuple[int, tuple[int, int]]:
+    """Writes the video. Returns the number of its frames, and their width and height, px.
 
     background, floor: (3,) RGB in 0..1.
     """
-
-    from gsac.avatar.artifacts import ArtifactError
     from gsac.avatar.film import draw_frames, fit_aspect, performance, turntable
-    from gsac.avatar.gsac_file.rigged import RiggedAvatar
     from gsac.avatar.video import Pictures, Video, VideoError
 
-    began = time.monotonic()
-    journal.starts("render", f"{file.name} to {out}")
     try:
-        avatar = RiggedAvatar.read(file)
-        motion = find_motion(arguments.motion, avatar)
         plan = (turntable(avatar, arguments.seconds or TURN_S, arguments.fps) if motion is None
                 else performance(motion, arguments.fps, arguments.seconds, arguments.yaw))
         size = size or (min(max(2 * math.ceil(fit_aspect(avatar, plan) * HEIGHT / 2), WIDTHS[0]), WIDTHS[1]), HEIGHT)
@@ -117,13 +127,9 @@ def film(file: Path, arguments: argparse.Namespace, out: Path, size: tuple[int, 
                     journal.progress("render", done, len(plan), "frames")
                     video.add(frame)
             made.replace(out)
-    except ArtifactError as e:
-        raise BadInput(str(e)) from e
     except VideoError as e:
         raise StageError(str(e).replace(str(made), str(out))) from e
-    seconds = time.monotonic() - began
-    journal.finishes("render", seconds)
-    return len(plan), size, seconds
+    return len(plan), size
 
 
 def check_out(out: Path, file: Path, force: bool) -> None:
@@ -141,17 +147,18 @@ def check_out(out: Path, file: Path, force: bool) -> None:
 
 def find_motion(asked: str | None, avatar: RiggedAvatar) -> Motion | None:
     """The motion of a file, or of the avatar's own clips by name; None where none is asked for."""
-    from gsac.avatar.motion.files import read_motion
-    from gsac.avatar.motion.source import Motion
-
     if asked is None:
         return None
     if Path(asked).is_file():
+        from gsac.avatar.motion.files import read_motion
+
         return read_motion(Path(asked), avatar.joint_names, avatar.parents, avatar.joints)
     if asked not in avatar.clips:
         raise BadInput(f"--motion {asked}: no such file{did_you_mean(asked, avatar.clips)}, and the avatar's clips are: "
                        f"{', '.join(avatar.clips) or 'none'}")
     import numpy as np
+
+    from gsac.avatar.motion.source import Motion
 
     clip = avatar.clips[asked]
     closed = [*range(len(clip.rotation)), *([0] if clip.loop else [])]

@@ -1,6 +1,7 @@
 """gsac render by its command line, on the small figure of the export's tests."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -143,6 +144,14 @@ def test_a_damaged_motion_names_its_line_and_leaves_no_video(run, tmp_path, caps
     code, out, err = render(capsys, run, "--motion", tmp_path / "odd.bvh", "--out", tmp_path / "a.mp4", "--json")
     assert code == 2 and f"odd.bvh, line {len(lines) - 1}: 3 numbers" in err
     assert "odd.bvh" in json.loads(out.splitlines()[-1])["error"] and not (tmp_path / "a.mp4").exists()
+
+
+def test_a_motion_that_cannot_be_read_is_refused_before_what_draws_is_loaded(run, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gsac.avatar.film", None)
+    (tmp_path / "junk.bvh").write_text("junk")
+    for name, words in (("gone.bvh", "gone.bvh: no such file"), ("junk.bvh", "junk.bvh, line 1: 'junk'")):
+        code, _, err = render(capsys, run, "--motion", tmp_path / name, "--out", tmp_path / "a.mp4")
+        assert code == 2 and words in err and "starts" not in err
 
 
 SMALL = ("--size", "16x16", "--seconds", 0.1, "--fps", 10)
