@@ -100,6 +100,9 @@ def main() -> int:
     except ValueError as e:
         print(e, file=sys.stderr)
         return 2
+    except OSError as e:
+        print(e.strerror, file=sys.stderr)
+        return 2
     except MemoryError:
         print(f"reading it takes more than {MAX_MEMORY} bytes of memory", file=sys.stderr)
         return 2

@@ -40,3 +40,9 @@ def test_an_fbx_that_cannot_be_read_is_named_and_ends_nothing(figure, file, tmp_
     path.write_bytes(file.read_bytes()[:5000] if content is None else content)
     with pytest.raises(MotionError, match=r"odd\.fbx: "):
         read(figure, path)
+
+
+def test_an_fbx_that_cannot_be_opened_says_why(figure, tmp_path):
+    (tmp_path / "odd.fbx").mkdir()
+    with pytest.raises(MotionError, match=r"odd\.fbx: Is a directory"):
+        read(figure, tmp_path / "odd.fbx")
