@@ -125,7 +125,8 @@ def find_lost(outline: np.ndarray, probability: np.ndarray, bones: np.ndarray) -
     outline: (H, W) bool; probability: (H, W) uint8, the network's; bones: (H, W) px, from the bones.
     """
     lost = (probability > 127) & ~outline & (bones < LOST * len(outline))
-    count, part = cv2.connectedComponents((outline | lost).astype(np.uint8), connectivity=8)
+    count, labels = cv2.connectedComponents((outline | lost).astype(np.uint8), connectivity=8)
+    part = labels.astype(np.intp)
     ours = np.bincount(part[outline | (bones < ON_BONE * len(outline))], minlength=count) > 0
     return lost & ours[part]
 
