@@ -15,13 +15,14 @@ from gsac.stages.train.fast.finish import Finish
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians.coarser import Coarser
+from gsac.stages.train.gaussians.specks import find_specks
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
 from gsac.stages.train.task import Fit, Task
 
 
 def fit_fast(backend: Backend, task: Task) -> Fit:
-    """Aligns the poses, fits the given number of gaussians or searches for it; adds coarser levels; finishes them all.
+    """Aligns the poses, fits the given number of gaussians or searches for it, less specks; adds coarser levels; finishes them all.
 
     On a GPU the levels are fitted beside what else is done, and go on behind the caller.
     """
@@ -29,6 +30,8 @@ def fit_fast(backend: Backend, task: Task) -> Fit:
         prealign.adjust(task, backend)
     fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, budget(task, backend.device))
     require_finite("after the last step", named_values(fit.gaussians))
+    kept = ~find_specks(fit.gaussians, task.poses, {int(t): task.views[t] for t in task.trained})
+    fit = replace(fit, gaussians=fit.gaussians[kept], seen=fit.seen[kept])
     with_drift = replace(task, poses=task.poses.copy())
     aside, coarser = ThreadPoolExecutor(2), Coarser()
     finish = aside.submit(Finish, task.poses, task.trained)
