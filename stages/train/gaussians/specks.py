@@ -23,8 +23,8 @@ FRAMES = 16
 EMPTY = 13
 """Mask, of 255, below which a pixel shows the scene."""
 OFF = 2 / 1280
-"""Share of the frame's height off the mask from which alpha of `FULL_SIZE` gaussians begins to count (fewer are wider); from twice as
-far all does."""
+"""Share of the frame's height off the mask from which alpha of `FULL_SIZE` gaussians begins to count (fewer are wider); from twice
+as far all does."""
 SHOWN = 0.1
 """Alpha from which on a pixel belongs to a speck."""
 SIZE = 1e-3
