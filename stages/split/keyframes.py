@@ -9,12 +9,13 @@ import av
 import numpy as np
 from av.error import FFmpegError
 
-from gsac.stages.split.pick import pick_evenly
+from gsac.stages.split.pick import pick_evenly, turn_size
 from gsac.stages.split.probe import Video, open_video
 
 
 def read_key_frames(path: Path, video: Video, count: int, width: int, height: int) -> Iterator[np.ndarray]:
-    """Yields (height, width, 3) uint8 of at most `count` key frames, upright, spread evenly; ends early where one is damaged.
+    """Yields (height, width, 3) uint8 of at most `count` key frames, as shown and turned by the video's `quarters`, spread evenly;
+    ends early where one is damaged.
 
     HDR is not tone-mapped.
     """
@@ -30,6 +31,19 @@ def read_key_frames(path: Path, video: Video, count: int, width: int, height: in
                 return
             if frame is None:
                 return
-            quarters = (round(frame.rotation / 90) + video.quarters) % 4
-            size = (height, width) if quarters % 2 else (width, height)
-            yield np.ascontiguousarray(np.rot90(frame.to_ndarray(format="rgb24", width=size[0], height=size[1]), quarters))
+            over, quarters = read_display(frame)
+            quarters += video.quarters
+            stored = turn_size(width, height, quarters)
+            picture = frame.to_ndarray(format="rgb24", width=stored[0], height=stored[1])
+            yield np.ascontiguousarray(np.rot90(picture[::-1] if over else picture, quarters))
+
+
+def read_display(frame: av.VideoFrame) -> tuple[bool, int]:
+    """Whether the stored picture is turned over, top to bottom, before it is shown, and by how many quarters, counter-clockwise as
+    seen, it is turned then. By the file's display matrix, from which PyAV's `rotation` takes the angle alone."""
+    data = frame.side_data.get("DISPLAYMATRIX")
+    if data is None:
+        return False, 0
+    # The place (x, y) of a pixel is shown at (a x + c y, b x + d y), but for scale and shift.
+    a, b, _, c, d = np.frombuffer(data, np.int32)[:5].astype(float)
+    return bool(a * d < b * c), round(-np.arctan2(b, a) / (np.pi / 2))

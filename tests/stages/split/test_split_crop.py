@@ -115,11 +115,12 @@ def test_a_person_who_leaves_the_crop_altogether_is_in_frames_that_are_whole(tmp
     assert clip.crop is None and len(frames) == 10
 
 
-def test_a_crop_is_right_in_footage_that_lies_on_its_side(tmp_path):
-    lying = make_clip(tmp_path / "lying.mp4", STANDS, "transpose=clock")
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_crop_is_right_in_footage_that_lies_on_its_side(tmp_path, mirrored):
+    lying = make_clip(tmp_path / "lying.mp4", STANDS, *["hflip"] * mirrored, "transpose=clock")
     turned = tmp_path / "turned.mp4"
-    subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-display_rotation", "90", "-i", str(lying),
-                    "-c", "copy", str(turned)], check=True)
+    subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", "-display_rotation", "90",
+                    *["-display_hflip"] * mirrored, "-i", str(lying), "-c", "copy", str(turned)], check=True)
     upright = next(read_key_frames(turned, probe(turned), 3, WIDTH, HEIGHT))
     assert upright.shape == (HEIGHT, WIDTH, 3) and white(upright) == pytest.approx(np.array([60, 300, 100, 420]), abs=1)
     clip, frames, _ = split(turned, tmp_path / "out")

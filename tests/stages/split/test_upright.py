@@ -18,7 +18,9 @@ from gsac.stages.findings import Code
 from gsac.stages.split import stage
 from gsac.stages.split.config import NETWORKS, SplitConfig
 from gsac.stages.split.crop import Extent
+from gsac.stages.split.keyframes import read_key_frames
 from gsac.stages.split.people import People
+from gsac.stages.split.probe import probe
 from gsac.stages.split.upright import find_quarters
 
 FOOTAGE = Path(__file__).parents[4] / "shared" / "footage"
@@ -96,16 +98,48 @@ def test_who_stands_stays_so(tmp_path, red_heads, monkeypatch):
     assert told == [] and np.array_equal(frames, same)
 
 
+def tag(path: Path, *options: str) -> Path:
+    """The clip as MP4, nearly lossless, with a display matrix by ffmpeg's options."""
+    ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error"]
+    plain, tagged = path.with_name("plain.mp4"), path.with_name("tagged.mp4")
+    subprocess.run([*ffmpeg, "-i", path, "-c:v", "libx264", "-crf", "1", "-pix_fmt", "yuv444p", plain], check=True)
+    subprocess.run([*ffmpeg, *options, "-i", plain, "-c", "copy", tagged], check=True)
+    return tagged
+
+
 def test_a_tag_for_the_wrong_side_is_put_right(tmp_path, red_heads):
-    plain, tagged = make_clip(tmp_path / "a/clip.mkv", 1), tmp_path / "a/tagged.mp4"
-    subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", plain, "-c:v", "libx264", "-crf", "1", "-pix_fmt",
-                    "yuv444p", tmp_path / "a/plain.mp4"], check=True)
-    subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-display_rotation", "180", "-i",
-                    tmp_path / "a/plain.mp4", "-c", "copy", tagged], check=True)
+    tagged = tag(make_clip(tmp_path / "a/clip.mkv", 1), "-display_rotation", "180")
     frames, (told,) = split(tagged, tmp_path / "out")
     assert "to the left" in told.message
     np.testing.assert_allclose(frames[2].astype(int), person(2), atol=40)
     assert np.abs(frames[2].astype(int) - person(2)).mean() < 4
+
+
+@pytest.mark.parametrize("quarters, mirror", [(0, "-display_hflip"), (2, "-display_vflip")])
+def test_who_stands_by_a_tag_that_mirrors_stays_so(tmp_path, red_heads, quarters, mirror):
+    frames, told = split(tag(make_clip(tmp_path / "a/clip.mkv", quarters), mirror), tmp_path / "out")
+    assert told == [] and np.abs(frames[2].astype(int) - np.fliplr(person(2))).mean() < 4
+
+
+@pytest.mark.parametrize("mirror", [[], ["-display_hflip"]])
+@pytest.mark.parametrize("angle", ["0", "90", "180", "270"])
+def test_key_frames_are_the_pictures_that_ffmpeg_writes_by_any_tag(tmp_path, angle, mirror):
+    tagged = tag(make_clip(tmp_path / "a/clip.mkv", 0), "-display_rotation", angle, *mirror)
+    video = probe(tagged)
+    picture = next(read_key_frames(tagged, video, 1, video.width, video.height))
+    written = subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-loglevel", "error", "-i", tagged, "-frames:v", "1",
+                              "-f", "rawvideo", "-pix_fmt", "rgb24", "-"], check=True, capture_output=True).stdout
+    np.testing.assert_allclose(picture.astype(int), np.frombuffer(written, np.uint8).reshape(picture.shape), atol=2)
+
+
+def test_a_tag_of_zeros_turns_nothing(tmp_path):
+    tagged = tag(make_clip(tmp_path / "a/clip.mkv", 0))
+    content = bytearray(tagged.read_bytes())
+    matrix = content.index(b"tkhd") + 44
+    content[matrix:matrix + 36] = bytes(36)
+    tagged.write_bytes(content)
+    picture = next(read_key_frames(tagged, probe(tagged), 1, WIDTH, HEIGHT))
+    assert np.abs(picture.astype(int) - person()).mean() < 4
 
 
 def test_large_footage_is_cut_about_the_person_after_it_was_turned(tmp_path, red_heads):
