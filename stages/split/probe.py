@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -10,6 +11,7 @@ import av
 import av.container
 import numpy as np
 from av.container import InputContainer
+from av.error import FFmpegError
 
 from gsac.stages.contract import BadInput
 from gsac.stages.split.pick import turn_size
@@ -40,7 +42,7 @@ class Video:
     """(N,) int64, when each frame is decoded, in time_base, none twice; empty where the container does not tell."""
     time_base: Fraction
     declared_frames: int
-    """Number of frames by the header; 0 where it has none."""
+    """Number of frames by the header, among them those that are kept and not shown; 0 where it has none."""
     width: int
     height: int
     """Displayed size, px: after the rotation tag and `quarters`, with square pixels."""
@@ -86,9 +88,20 @@ def file_url(path: Path) -> str:
     return f"file:{path.absolute()}"
 
 
-def open_video(path: Path) -> InputContainer:
-    """Under `LIMITS`."""
-    return av.open(file_url(path), options=LIMITS, metadata_errors="ignore")
+def open_video(path: Path, **options: str) -> InputContainer:
+    """Under `LIMITS`. options: further ones of ffmpeg's."""
+    return av.open(file_url(path), options=LIMITS | options, metadata_errors="ignore")
+
+
+def count_stored(path: Path, video: Video) -> int:
+    """Number of the video's frames that are in the file, among them those that it keeps and does not show, as where it was trimmed
+    without loss."""
+    with open_video(path, ignore_editlist="1") as container:
+        count = 0
+        with contextlib.suppress(FFmpegError):  # a truncated file, as in _packet_times
+            for packet in container.demux(container.streams[video.stream]):
+                count += packet.size > 0 and not packet.is_corrupt
+        return count
 
 
 def _is_text(path: Path) -> bool:
@@ -147,7 +160,7 @@ def _first_picture(container: InputContainer, stream: av.VideoStream, path: Path
         try:
             for picture in packet.decode():
                 return picture
-        except av.FFmpegError as e:
+        except FFmpegError as e:
             error = _reason(e)
     raise BadInput(f"{path.name}: no frame can be decoded ({error}). The file is empty or damaged; "
                    "copy it from the phone again.")
@@ -167,7 +180,7 @@ def _packet_times(path: Path, index: int) -> tuple[np.ndarray, np.ndarray, np.nd
                 ticks.append(packet.pts)
                 sent.append(packet.dts)
                 keys += [packet.pts] * packet.is_keyframe
-        except av.FFmpegError:
+        except FFmpegError:
             pass  # a truncated file: what was read so far is what there is
     rising, first = np.unique(np.array(ticks, np.int64), return_index=True)
     told = None not in sent and len(set(sent)) == len(rising) == len(ticks)

@@ -183,6 +183,22 @@ def test_a_truncated_video_keeps_what_decodes_and_says_how_many(tmp_path):
     assert "60 frames" in warnings[0] and str(len(frames)) in warnings[0]
 
 
+def test_a_clip_that_was_trimmed_without_loss_is_whole_unless_it_is_cut_off(tmp_path):
+    whole = make_clip(tmp_path / "a.mp4", "-g", "10", size="320x240")
+    trimmed, shorter, cut = (tmp_path / name for name in ("trimmed.mp4", "shorter.mp4", "cut.mp4"))
+    ffmpeg("-ss", 0.5, "-i", whole, "-c", "copy", "-movflags", "+faststart", "-movie_timescale", "1000", trimmed)
+    content = bytearray(trimmed.read_bytes())
+    cut.write_bytes(content[: int(len(content) * 0.6)])
+    length = content.index(b"elst") + 12  # of the part that is shown, ms
+    content[length:length + 4] = (300).to_bytes(4, "big")
+    shorter.write_bytes(content)
+    for source, shown in ((trimmed, 15), (shorter, 9)):
+        _, frames, warnings = split(source, tmp_path / source.stem, fps=None)
+        assert (len(frames), warnings) == (shown, [])
+    _, _, warnings = split(cut, tmp_path / "cut", fps=None)
+    assert "cut.mp4 is truncated: its header promises 20 frames" in warnings[0]
+
+
 def test_a_clip_most_of_whose_frames_are_damaged_gives_the_others_and_says_so(tmp_path):
     source = make_clip(tmp_path / "a.mov", "-c:v", "png", size="64x48", rate=10)
     start, *frames = source.read_bytes().split(b"IDAT")
