@@ -27,7 +27,17 @@ RUNNING = ("run", "demo", "batch", "stage", "bench")
 
 def main(argv: list[str] | None = None) -> None:
     """Entry point; exits with an ExitCode."""
+    open_closed_streams()
     sys.exit(int(execute(sys.argv[1:] if argv is None else argv)))
+
+
+def open_closed_streams() -> None:
+    """Each standard stream that was closed leads to nowhere; else the next file opened would get its descriptor and its words."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            descriptor = os.open(os.devnull, os.O_RDWR)  # the lowest free one, which is the stream's own
+            os.set_inheritable(descriptor, True)
+            setattr(sys, name, os.fdopen(descriptor, mode))
 
 
 def execute(argv: list[str]) -> ExitCode:

@@ -19,6 +19,14 @@ def test_version_prints_the_installed_version(toy):
     assert done.code == 0 and done.out == f"gsac {package_version('gsac')}\n"
 
 
+@pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
+def test_a_closed_standard_stream_takes_nothing_from_a_run(toy, closed):
+    done = subprocess.run(["sh", "-c", f'exec "$@" {closed}', "sh", *toy.command("run", toy.clip, "--out", toy.out)],
+                          cwd=toy.root, env=toy.env, text=True, capture_output=True, timeout=60)
+    assert done.returncode == 0 and toy.result == "ALPHA ALPHA"
+    assert done.stdout == f"{toy.out}\n" if "1" not in closed else done.stdout == ""
+
+
 @pytest.mark.parametrize("argv", [[], ["-q"]])
 def test_gsac_alone_prints_its_commands_and_exits_as_a_mistake(capsys, argv):
     assert execute(argv) == ExitCode.USAGE
