@@ -37,7 +37,7 @@ def resolve(project: Project, file: Path | None = None, sets: Iterable[str] = ()
         for section, parameters in sections.items():
             if section not in values:
                 known = ", ".join(project.graph.steps)
-                raise BadInput(f"{source}: unknown section {section!r}{did_you_mean(str(section), values)}; known: {known}")
+                raise BadInput(f"{source}: unknown section {section!r}{did_you_mean(section, values)}; known: {known}")
             if section not in wanted:
                 continue
             values[section] |= parameters
@@ -106,7 +106,8 @@ def _sections(document: Any, source: str) -> Values:
     for section, parameters in document.items():
         if parameters is not None and not isinstance(parameters, dict):
             raise BadInput(f"{source}: section {section} must hold parameters, found {parameters!r}")
-    return {section: parameters or {} for section, parameters in document.items()}
+    return {str(section): {str(name): value for name, value in (parameters or {}).items()}  # YAML takes 1 and off for no words
+            for section, parameters in document.items()}
 
 
 def _assignment(text: str) -> Values:

@@ -82,6 +82,8 @@ def test_later_sources_win_and_types_are_those_of_yaml(toy):
     ("left: {wrd: x}", ["mine.yaml", "left.wrd", "known: keep, model, pause_s, trouble, word"]),
     ("left: {word: middle}", ["mine.yaml", "left.word", "middle", "first, last"]),
     ("leftt: {word: last}", ["mine.yaml", "leftt", "cut, left, right, join"]),
+    ("left: {1: 2}", ["mine.yaml", "unknown parameter left.1; known: keep"]),
+    ("1: {word: last}", ["mine.yaml", "unknown section '1'; known: cut"]),
     ("left: 3", ["mine.yaml", "left", "3"]),
     ("left:\n  word: last\n  word: first\n", ["mine.yaml", "line 3", "word", "second time"]),
     ("left: {word: last}\nleft: {keep: 1}\n", ["mine.yaml", "line 2", "left", "second time"]),
