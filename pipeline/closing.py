@@ -21,7 +21,7 @@ def closing_lines(folder: RunFolder) -> list[str]:
     lines = [f"verdict: {origin.verdict}"] if origin is not None and origin.verdict else []
     lines += [f"{name + ':':<8} {folder.root / path}" for name, path in RESULTS.items() if (folder.root / path).exists()]
     if (folder.root / RESULTS["viewer"]).exists():
-        lines.append(f"next:    {program()} view {shlex.quote(shortest(folder.root))}")
+        lines.append(f"next:    {program()} view {typed(shortest(folder.root))}")
     return lines
 
 
@@ -29,6 +29,14 @@ def program() -> str:
     """`gsac`, or as it was called where that alone is not found."""
     called = sys.argv[0]
     return shlex.quote(called) if Path(called).name == "gsac" and shutil.which("gsac") is None else "gsac"
+
+
+def typed(path: str) -> str:
+    """The path as a shell reads it; one that cannot be printed in the form $'\\xff' of bash and zsh."""
+    if path.isprintable():
+        return shlex.quote(path)
+    escaped = path.replace("\\", "\\\\").replace("'", "\\'")
+    return f"$'{os.fsencode(escaped).decode('ascii', 'backslashreplace')}'"
 
 
 def shortest(path: Path) -> str:

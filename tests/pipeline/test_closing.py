@@ -1,5 +1,8 @@
 """The last lines of a run."""
 
+import os
+import subprocess
+
 import pytest
 
 from gsac.pipeline.closing import closing_lines
@@ -29,6 +32,13 @@ def test_the_next_command_is_typed_as_this_one_was_where_the_name_alone_is_not_f
     monkeypatch.setattr("sys.argv", ["/there/my bin/gsac", "run"])
     monkeypatch.setenv("PATH", "/nowhere")
     assert closing_lines(folder)[-1] == "next:    '/there/my bin/gsac' view 'my avatar'"
+
+
+def test_a_name_that_is_not_text_is_written_as_a_shell_reads_it(folder):
+    path = os.fsdecode(b"it's a \\ b\xc3\xa4d\xff-avatar")
+    line = closing_lines(RunFolder(folder.root.rename(folder.root.with_name(path))))[-1]
+    said = subprocess.run(["bash", "-c", line.replace("next:    gsac view", "printf %s")], capture_output=True)
+    assert line.isascii() and said.stdout == os.fsencode(path)
 
 
 def test_a_run_that_stops_early_names_only_what_is_there(folder):
