@@ -6,6 +6,7 @@ Only the module of the command that was typed is imported: a run with nothing to
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from functools import partial
@@ -28,6 +29,8 @@ RUNNING = ("run", "demo", "batch", "stage", "bench")
 def main(argv: list[str] | None = None) -> None:
     """Entry point; exits with an ExitCode."""
     open_closed_streams()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="surrogateescape")  # a path whose bytes are not text is told by those bytes
     sys.exit(int(execute(sys.argv[1:] if argv is None else argv)))
 
 

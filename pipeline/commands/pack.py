@@ -75,7 +75,7 @@ def gather(folder: Path) -> dict[str, Path | str]:
     for name in (REPORT, METRICS, PARAMS, f"{EXPORT}/{VIEWER}"):
         if not (folder / name).is_file():
             raise BadInput(f"{folder / name} is missing; `{recovery(folder / name)}` makes it")
-    members: dict[str, Path | str] = {VIEWER: FIRST_PAGE, README: WORDS.format(name=folder.name)}
+    members: dict[str, Path | str] = {VIEWER: FIRST_PAGE, README: WORDS.format(name=as_text(folder.name))}
     for name in (EXPORT, METRICS, PARAMS, REPORT, *find_addresses(folder / REPORT)):
         members |= find_files(folder, name)
     return dict(sorted(members.items()))
@@ -112,6 +112,11 @@ def find_addresses(page: Path) -> list[str]:
     return sorted({unquote(part.path) for part in parts if part.path and not part.scheme and not part.netloc})
 
 
+def as_text(name: str) -> str:
+    """A file's name with a mark in place of each byte that is not UTF-8: a zip and a page hold text alone."""
+    return os.fsencode(name).decode(errors="replace")
+
+
 def write_zip(out: Path, name: str, members: dict[str, Path | str]) -> int:
     """Writes the members below one folder of this name, whole or not at all; equal members give equal bytes.
 
@@ -120,7 +125,7 @@ def write_zip(out: Path, name: str, members: dict[str, Path | str]) -> int:
     with half_made(out.parent) as (temp, _):
         with zipfile.ZipFile(temp / out.name, "w") as archive:
             for member, source in members.items():
-                info = undated(f"{name}/{member}")
+                info = undated(as_text(f"{name}/{member}"))
                 info.compress_type, info.create_system, info.external_attr = zipfile.ZIP_DEFLATED, 3, 0o644 << 16
                 if isinstance(source, str):
                     archive.writestr(info, source)

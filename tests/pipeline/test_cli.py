@@ -27,6 +27,13 @@ def test_a_closed_standard_stream_takes_nothing_from_a_run(toy, closed):
     assert done.stdout == f"{toy.out}\n" if "1" not in closed else done.stdout == ""
 
 
+def test_a_path_that_is_not_text_is_told_by_its_bytes(toy):
+    out = os.fsencode(toy.root) + b"/bad\xff"
+    done = subprocess.run(toy.command("run", toy.clip, "--out", os.fsdecode(out), "--until", "cut"), cwd=toy.root,
+                          env=toy.env | {"PYTHONIOENCODING": "utf-8:strict"}, capture_output=True, timeout=60)
+    assert done.returncode == 0 and done.stdout == out + b"\n"
+
+
 @pytest.mark.parametrize("argv", [[], ["-q"]])
 def test_gsac_alone_prints_its_commands_and_exits_as_a_mistake(capsys, argv):
     assert execute(argv) == ExitCode.USAGE

@@ -153,6 +153,15 @@ def test_what_the_user_added_to_export_goes_along_hidden_files_and_the_zip_itsel
     assert "export/note.txt" in names and not {"export/.thumbs", "export/all.zip"} & names
 
 
+def test_names_that_are_not_text_go_along_with_their_bytes_replaced(folder, capsys):
+    folder = folder.rename(folder.with_name(os.fsdecode(b"bad\xff-avatar")))
+    (folder / "export" / os.fsdecode(b"note\xff.txt")).write_text("mine")
+    assert pack(capsys, folder, "--out", "bad.zip")[0] == 0
+    archive = zipfile.ZipFile("bad.zip")
+    assert archive.read("bad\ufffd-avatar/export/note\ufffd.txt") == b"mine"
+    assert archive.read("bad\ufffd-avatar/README.txt").decode().startswith("bad\ufffd-avatar: an avatar that GSAC made")
+
+
 @pytest.mark.parametrize(("gone", "words"), [
     ("report.html", "report.html is missing; `gsac run"), ("export/viewer.html", "viewer.html is missing; `gsac run"),
     ("export/avatar.glb", "links to export/avatar.glb, which is not in"), ("dvc.yaml", "not the folder of a run")])
