@@ -19,9 +19,12 @@ def run_folder_here() -> RunFolder:
 
 
 def find_clip(path: Path | None) -> Path:
-    """Absolute path of the clip; None: the clip of the run that the command was typed in. BadInput where there is none."""
+    """Absolute path of the clip; None: the clip of the run that the command was typed in. BadInput where there is none, or
+    where the path is that of a run's folder."""
     if path is None:
         return run_folder_here().require_clip()
     if not path.exists():
         raise BadInput(f"{path}: no such file or folder; give a video or a folder of photos")
+    if RunFolder(path).is_run:
+        raise BadInput(f"{path} is the folder of a run; give its clip, {RunFolder(path).require_clip()}")
     return path.resolve()

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from gsac.cache.store import Store
+from gsac.pipeline.asked_clip import find_clip
 from gsac.pipeline.cost_forecast import Forecaster
 from gsac.pipeline.executors.executor import ClipJob
 from gsac.pipeline.graph import CLIP
@@ -80,8 +81,8 @@ class BatchPlanner:
     def plan(self, job: ClipJob) -> ClipPlan:
         """What the run of one clip would do."""
         try:
-            digest = source_digest(job.clip, self.store)
-            folder, clip = RunFolder(job.out), job.clip.resolve()
+            folder, clip = RunFolder(job.out), find_clip(job.clip)
+            digest = source_digest(clip, self.store)
             folder.refuse_foreign(clip, self.keys.project)
             make_way(folder, clip, self.store, self._replace)
         except BadInput as error:

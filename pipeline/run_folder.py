@@ -68,6 +68,11 @@ class RunFolder:
         raise BadInput(f"{start} is not in the output folder of a run: no {DAG} here or above{but}; {hint}")
 
     @property
+    def is_run(self) -> bool:
+        """Whether it is a run's folder already: others, too, keep a dvc.yaml."""
+        return (self.root / DAG).is_file() and os.path.lexists(self.clip)
+
+    @property
     def clip(self) -> Path:
         """The link to the source clip."""
         return self.root / CLIP

@@ -311,6 +311,16 @@ def test_a_quality_for_the_run_in_this_folder_is_refused_with_the_command_that_d
     assert done.code == 2 and "no clip here (a link to" in done.err
 
 
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_the_folder_of_a_run_is_no_clip_and_the_clip_of_that_run_is_named(toy, command):
+    toy.ran()
+    done = toy.gsac(command, toy.out)
+    assert done.code == 2 and f"{toy.out} is the folder of a run; give its clip, {toy.clip.resolve()}" in done.err
+    batch = toy.root / "clips.txt"
+    batch.write_text(f"{toy.out}\n")
+    assert f"is the folder of a run; give its clip, {toy.clip.resolve()}" in toy.gsac("batch", batch, "--dry-run").err
+
+
 def test_check_takes_the_clip_of_the_run_that_it_is_typed_in(toy, monkeypatch):
     toy.ran("--until", "left")
     monkeypatch.chdir(toy.out / "left")
