@@ -6,7 +6,7 @@ import os
 import shlex
 from pathlib import Path
 
-from gsac.cache.roots import find_links, object_of
+from gsac.cache.roots import object_of
 from gsac.pipeline.quality import STANDARD, name_of
 from gsac.pipeline.rows import read_json
 from gsac.pipeline.run_folder import DAG, PARAMS, RUN, RunFolder
@@ -15,7 +15,7 @@ from gsac.stages.contract import BadInput
 
 def require_files(folder: Path) -> None:
     """BadInput where any link of a run's folder leads to nothing; it says how to get the files back."""
-    for name in find_links(folder):
+    for name in RunFolder(folder).links():
         require_file(folder / name)
 
 

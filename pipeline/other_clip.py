@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gsac.cache.roots import find_links
 from gsac.cache.store import Store
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.rows import port_digest, read_json, result_row, rows_of
@@ -18,7 +17,7 @@ def find_other_clip(folder: RunFolder, clip: Path, store: Store) -> str | None:
     """Path of the clip whose results the folder holds, where it has another path and other content than this one; else None."""
     run = read_json(folder.root / RUN)
     run = run if isinstance(run, dict) else {}
-    if not any(map(result_row, rows_of(run).values())) and not find_links(folder.root):
+    if not any(map(result_row, rows_of(run).values())) and not folder.links():
         return None
     there = str(run.get("clip") or (os.readlink(folder.clip) if folder.clip.is_symlink() else folder.clip))
     digest = run.get("clip_digest") or port_digest(folder, CLIP, store)

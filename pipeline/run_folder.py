@@ -197,7 +197,14 @@ class RunFolder:
     def objects(self) -> set[str]:
         """Names of the store's objects that this folder shows, as links or as copies."""
         copies = {object_name(digest, port) for port, placed in self._placed().items() if "/" in port for digest in placed.split()}
-        return {*find_links(self.root).values(), *copies}
+        return {*self.links().values(), *copies}
+
+    def links(self) -> dict[str, str]:
+        """Relative path -> object's name, of this run's links into a store: not those of runs in folders below."""
+        return {path: name for path, name in find_links(self.root).items() if self._is_own(self.root / path)}
+
+    def _is_own(self, path: Path) -> bool:
+        return next(folder for folder in path.parents if folder == self.root or RunFolder(folder).is_run) == self.root
 
     def _placed(self) -> dict[str, str]:
         with contextlib.suppress(OSError, ValueError):

@@ -6,6 +6,7 @@ import pytest
 
 from gsac.pipeline.batch import make_jobs
 from gsac.pipeline.commands.run import default_out
+from gsac.pipeline.run_folder import RunFolder
 
 
 @pytest.fixture
@@ -105,6 +106,15 @@ def test_folders_of_photos_whose_names_differ_behind_a_dot_have_folders_of_their
     jobs = make_jobs(clips, tmp_path, ())
     assert [job.out.name for job in jobs] == [*names, "turn-2-avatar"]
     assert [job.name for job in jobs] == ["turn.v1", "turn.v2", "turn.mp4", "turn.mp4 (turn-2-avatar)"]
+
+
+def test_a_run_goes_into_the_folder_around_another_run_and_leaves_that_as_it_is(toy, other):
+    inner = toy.out / "inner"
+    assert toy.gsac("run", toy.clip, "--out", inner).code == 0
+    assert toy.gsac("run", other, "--out", toy.out).code == 0 and toy.result == "OMEGA OMEGA"
+    assert (inner / "join" / "out.txt").read_text() == "ALPHA ALPHA" and (inner / "clip").resolve() == toy.clip
+    assert toy.gsac("run", toy.clip, "--out", inner).code == toy.gsac("status", inner).code == 0
+    assert RunFolder(toy.out).links().keys() == RunFolder(inner).links().keys()
 
 
 @pytest.mark.parametrize("lost", ["run.json", "clip"])
