@@ -234,7 +234,8 @@ class RunFolder:
         return path.exists() and tree_digest(path.resolve(), store.memo)[0] == record.outputs[output]
 
     def refuse_foreign(self, clip: Path, project: Project) -> None:
-        """BadInput where the folder is that of the photos, or holds files of another project, which would be overwritten."""
+        """BadInput where the folder is that of the photos, holds files of another project, which would be overwritten, or lies in
+        another run's."""
         if clip.is_dir() and clip in (self.root.resolve(), *self.root.resolve().parents):
             raise BadInput(f"{self.root} lies in the folder of the photos, which is left as it is; give --out a folder elsewhere")
         if self.root == project.dag.parent:
@@ -246,6 +247,9 @@ class RunFolder:
             except BadInput as e:
                 raise BadInput(f"{self.root} holds another project's {DAG} ({e}); choose another --out") from e
             return
+        around = next((folder for folder in Path(os.path.realpath(self.root)).parents if RunFolder(folder).is_run), None)
+        if around is not None:
+            raise BadInput(f"{self.root} lies in {around}, the folder of another run; choose another --out")
         photos = find_photos(self.root) if self.root.is_dir() else []
         if len(photos) > 1:
             raise BadInput(f"{self.root} holds {len(photos)} photos, a clip of its own, which would hold results then; "

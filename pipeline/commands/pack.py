@@ -14,6 +14,7 @@ from urllib.parse import unquote, urlsplit
 
 from gsac.avatar.zip_member import undated
 from gsac.cache.digest import tree_files
+from gsac.cache.errors import CacheError
 from gsac.cache.half_made import half_made
 from gsac.pipeline.avatar_file import EXPORT
 from gsac.pipeline.commands.options import add_force, add_json, progress_reporter, require_free, warn_stale
@@ -89,7 +90,11 @@ def find_files(folder: Path, name: str) -> Iterator[tuple[str, Path]]:
         raise BadInput(f"{folder / REPORT} links to {name}, which is not in {folder}; `{recovery(folder / REPORT)}` makes it anew")
     tops = [top for top in path.iterdir() if not top.name.startswith(".")] if path.is_dir() else [path]
     for top in tops:
-        for inner, file in tree_files(top.resolve()).items():
+        try:
+            files = tree_files(top.resolve())
+        except CacheError as e:
+            raise BadInput(f"{e}; take it out of {path}") from e
+        for inner, file in files.items():
             yield "/".join(filter(None, (top.relative_to(folder).as_posix(), inner))), file
 
 

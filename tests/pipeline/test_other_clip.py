@@ -117,6 +117,16 @@ def test_a_run_goes_into_the_folder_around_another_run_and_leaves_that_as_it_is(
     assert RunFolder(toy.out).links().keys() == RunFolder(inner).links().keys()
 
 
+@pytest.mark.parametrize("inside", ["export", "join", "new/deep"])
+def test_nothing_of_a_run_is_written_into_the_folder_of_another(toy, other, inside):
+    toy.ran()
+    before = sorted(toy.out.rglob("*"))
+    for dry in ([], ["--dry-run"]):
+        done = toy.gsac("run", other, "--out", toy.out / inside, *dry)
+        assert done.code == 2 and f"{toy.out / inside} lies in {toy.out}, the folder of another run; choose" in done.err
+    assert sorted(toy.out.rglob("*")) == before
+
+
 @pytest.mark.parametrize("lost", ["run.json", "clip"])
 def test_a_folder_that_has_lost_its_record_or_its_clip_is_still_the_other_clips(toy, other, lost):
     toy.ran()

@@ -153,6 +153,14 @@ def test_what_the_user_added_to_export_goes_along_hidden_files_and_the_zip_itsel
     assert "export/note.txt" in names and not {"export/.thumbs", "export/all.zip"} & names
 
 
+def test_a_link_to_a_folder_below_export_is_named_with_where_to_take_it_from(folder, capsys):
+    (folder / "export" / "mine").mkdir()
+    (folder / "export" / "mine" / "link").symlink_to(folder)
+    code, _, err = pack(capsys, folder, "--out", "a.zip")
+    assert code == 2 and f"{folder}/export/mine/link is neither a file nor a folder" in err and not Path("a.zip").exists()
+    assert err.endswith(f"; take it out of {folder}/export\n")
+
+
 def test_names_that_are_not_text_go_along_with_their_bytes_replaced(folder, capsys):
     folder = folder.rename(folder.with_name(os.fsdecode(b"bad\xff-avatar")))
     (folder / "export" / os.fsdecode(b"note\xff.txt")).write_text("mine")
