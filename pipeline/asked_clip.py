@@ -25,6 +25,8 @@ def find_clip(path: Path | None) -> Path:
         return run_folder_here().require_clip()
     if not path.exists():
         raise BadInput(f"{path}: no such file or folder; give a video or a folder of photos")
+    if not (path.is_file() or path.is_dir()):
+        raise BadInput(f"{path} is no regular file; give a video or a folder of photos")
     if RunFolder(path).is_run:
         raise BadInput(f"{path} is the folder of a run; give its clip, {RunFolder(path).require_clip()}")
     return path.resolve()

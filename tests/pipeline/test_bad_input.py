@@ -44,6 +44,13 @@ def test_json_of_a_failed_stage_is_still_one_object(toy):
     assert len(done.out.splitlines()) == 1 and done.statuses == {"cut": "ran", "left": "failed"}
 
 
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_a_clip_that_is_a_device_or_a_pipe_is_named(toy, command):
+    os.mkfifo(toy.root / "pipe.mp4")
+    for clip in ("/dev/zero", "pipe.mp4"):
+        assert f"{clip} is no regular file; give a video" in quiet(toy.gsac(command, clip), ExitCode.USAGE)
+
+
 def test_json_answers_a_clip_that_is_not_there(toy):
     done = toy.gsac("run", "nowhere.mp4", "--json")
     assert "nowhere.mp4: no such file" in quiet(done, ExitCode.USAGE) and "nowhere.mp4" in done.json["error"]
