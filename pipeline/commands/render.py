@@ -54,7 +54,7 @@ def declare(command: argparse.ArgumentParser) -> None:
                          help="or none: transparent, for .webm, .mov, .gif and PNG pictures; default: 2b303b")
     command.add_argument("--floor", metavar="RRGGBB", help="a floor of this colour with lines half a metre apart, which fades out")
     command.add_argument("--no-shadow", action="store_true", help="no soft shadow on the floor")
-    command.add_argument("--yaw", type=float, default=0.0, metavar="DEGREES",
+    command.add_argument("--yaw", type=float, metavar="DEGREES",
                          help="where the camera stands around a motion; default: 0, in front")
     add_json(command)
     command.set_defaults(do=do)
@@ -68,8 +68,10 @@ def do(arguments: argparse.Namespace) -> ExitCode:
         raise BadInput(f"--fps {arguments.fps:g}: expected 1 to 240")
     if arguments.seconds is not None and not 0 < arguments.seconds <= 3600:
         raise BadInput(f"--seconds {arguments.seconds:g}: expected more than 0, at most 3600")
-    if not -360 <= arguments.yaw <= 360:
+    if arguments.yaw is not None and not -360 <= arguments.yaw <= 360:
         raise BadInput(f"--yaw {arguments.yaw:g}: expected degrees, -360 to 360")
+    if arguments.yaw is not None and arguments.motion is None:
+        raise BadInput(f"--yaw {arguments.yaw:g}: goes with --motion alone; without one the avatar is seen from all sides")
     file = find_avatar(arguments.avatar)
     out = (arguments.out or Path(default_name(file, arguments.motion))).absolute()
     check_out(out, file, arguments.force)
@@ -117,7 +119,7 @@ def film(avatar: RiggedAvatar, motion: Motion | None, arguments: argparse.Namesp
 
     try:
         plan = (turntable(avatar, arguments.seconds or TURN_S, arguments.fps) if motion is None
-                else performance(motion, arguments.fps, arguments.seconds, arguments.yaw))
+                else performance(motion, arguments.fps, arguments.seconds, arguments.yaw or 0.0))
         size = size or (min(max(2 * math.ceil(fit_aspect(avatar, plan) * HEIGHT / 2), WIDTHS[0]), WIDTHS[1]), HEIGHT)
         with half_made(out.parent) as (folder, _):
             made = folder / out.name

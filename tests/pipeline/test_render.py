@@ -69,6 +69,7 @@ def test_a_walk_from_another_tool_is_the_walk_that_the_avatar_carries(run, tmp_p
     (["--size", "97x128"], "--size 97x128"), (["--size", "big"], "--size big"), (["--fps", "0"], "--fps 0"),
     (["--seconds", "-1"], "--seconds -1"), (["--background", "blue"], "--background blue"),
     (["--floor", "wood"], "--floor wood"), (["--yaw", "nan"], "--yaw nan"),
+    (["--yaw", "90"], "--yaw 90: goes with --motion alone"),
     (["--out", "clip.avi"], "clip.avi"), (["--motion", "jump"], "jump: no such file, and the avatar's clips are: wave, walk"),
     (["--motion", "wlk"], "wlk: no such file (did you mean walk?)")])
 def test_a_wrong_word_is_named_and_what_is_expected(run, tmp_path, capsys, monkeypatch, words, named):
