@@ -1,7 +1,8 @@
 """Gaussians that show as specks beside the person in the clip's own frames, of which each avatar has a few.
 
 On the rim of an ear that stands off on the body and not on the person a gaussian is hair from the side and a speck from the front:
-in too few pixels for the loss to take it away, and seen by everybody.
+in too few pixels for the loss to take it away, and seen by everybody. Hands keep theirs: where a mask has lost a finger, the finger
+would be the speck.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ import cv2
 import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import FINGERS, WRISTS, J
 from gsac.avatar.raster import render_backward, render_bound
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.config import FULL_SIZE
+from gsac.stages.train.gaussians.merge import skin_weights
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
+HANDS = [*WRISTS, *range(J)[FINGERS]]
 FRAMES = 16
 """Frames that are looked at, at most, each at half its size."""
 EMPTY = 13
@@ -34,7 +38,7 @@ MOST = 0.05
 
 
 def find_specks(gaussians: Gaussians, poses: Poses, views: Mapping[int, View]) -> np.ndarray:
-    """(N,) bool, the gaussians of which more than `MOST` is specks. views: trained frame -> view."""
+    """(N,) bool, the gaussians of which more than `MOST` is specks, but those of hands. views: trained frame -> view."""
     off = OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
 
     def of_frame(frame: tuple[int, View], workspace: Workspace) -> np.ndarray:
@@ -48,7 +52,7 @@ def find_specks(gaussians: Gaussians, poses: Poses, views: Mapping[int, View]) -
 
     some = list(views.items())[::-(-len(views) // FRAMES)]
     in_specks, added = np.sum(side_by_side(of_frame, some), 0)
-    return in_specks > MOST * added
+    return (in_specks > MOST * added) & (skin_weights(gaussians.face, poses.body)[:, HANDS].sum(1) < 0.5)
 
 
 def mark_specks(alpha: np.ndarray, mask: np.ndarray, off: float) -> np.ndarray:
