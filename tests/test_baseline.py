@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 BASELINE = Path(__file__).resolve().parents[1] / ".basedpyright" / "baseline.json"
-MOST = 224
+MOST = 155
 """To be lowered with every finding that is mended, never raised."""
 
 
