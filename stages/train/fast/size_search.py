@@ -16,7 +16,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import HEAD, JAW, WRISTS, J
 from gsac.avatar.metrics import psnr
-from gsac.avatar.raster import render_backward, render_bound
+from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.fast.backend import Backend, Trained
 from gsac.stages.train.fast.initial_gaussians import COLOUR_FRAMES
@@ -24,6 +24,7 @@ from gsac.stages.train.fast.refit import OF_SIZE
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.fast.size_rule import MOST_LOST, SizeScore, choose, optimism
 from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.gaussians.added_alpha import added_alpha
 from gsac.stages.train.gaussians.merge import merge_to_size, skin_weights
 from gsac.stages.train.gaussians.unseen import level_heights
 from gsac.stages.train.judge.heldout import Candidate, judge_person
@@ -106,8 +107,7 @@ def count_pixels(gaussians: Gaussians, task: Task, views: dict[int, View]) -> np
     """(N,) pixels that each gaussian adds to some of the trained frames."""
 
     def added(t: int, workspace: Workspace) -> np.ndarray:
-        rendering = render_bound(task.poses.vertices(t), task.poses.body.faces, gaussians, views[t].camera, workspace)
-        return render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0].copy()
+        return added_alpha(render_bound(task.poses.vertices(t), task.poses.body.faces, gaussians, views[t].camera, workspace))
 
     return sum(side_by_side(added, map(int, task.trained[::-(-len(task.trained) // COLOUR_FRAMES)])), np.zeros(len(gaussians)))
 

@@ -17,10 +17,11 @@ from gsac.avatar.binding import FaceFrames, bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
-from gsac.avatar.raster import render_backward, render_bound
+from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.config import FULL_SIZE
+from gsac.stages.train.gaussians.added_alpha import added_alpha
 from gsac.stages.train.gaussians.bends import BENDS, usual_pose
 from gsac.stages.train.gaussians.unseen import find_heights
 from gsac.stages.train.poses.poses import Poses
@@ -127,14 +128,10 @@ def place(posed: np.ndarray, faces: np.ndarray) -> Placed:
 
 
 def find_stray(gaussians: Gaussians, side: Side, faces: np.ndarray, workspace: Workspace) -> np.ndarray:
-    """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, seen from a side. faces: (F, 3).
-
-    What it adds is the gradient of a sum of pixels by its colour.
-    """
+    """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, seen from a side. faces: (F, 3)."""
     off = OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
-    counted = np.clip(side.away / off - 1, 0, 1)[..., None].astype(np.float32).repeat(3, 2)
     rendering = render_bound(side.vertices, faces, gaussians, side.camera, workspace)
-    return render_backward(rendering.state, counted, np.zeros_like(rendering.alpha)).rgb[:, 0] / side.area
+    return added_alpha(rendering, np.clip(side.away / off - 1, 0, 1)) / side.area
 
 
 def find_reach(gaussians: Gaussians, surface: Placed) -> np.ndarray:

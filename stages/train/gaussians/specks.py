@@ -14,9 +14,10 @@ import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import FINGERS, WRISTS, J
-from gsac.avatar.raster import render_backward, render_bound
+from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.config import FULL_SIZE
+from gsac.stages.train.gaussians.added_alpha import added_alpha
 from gsac.stages.train.gaussians.merge import skin_weights
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
@@ -42,13 +43,11 @@ def find_specks(gaussians: Gaussians, poses: Poses, views: Mapping[int, View]) -
     off = OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
 
     def of_frame(frame: tuple[int, View], workspace: Workspace) -> np.ndarray:
-        """(2, N) alpha that each gaussian adds to specks, and in all: gradients of sums of pixels by its colour."""
+        """(2, N) alpha that each gaussian adds to specks, and in all."""
         t, view = frame[0], frame[1].halved()
         rendering = render_bound(poses.vertices(t), poses.body.faces, gaussians, view.camera, workspace)
         specks = mark_specks(rendering.alpha, view.pixels[..., 3], off * frame[1].frame.height / 2)
-        nothing = np.zeros_like(rendering.alpha)
-        return np.stack([render_backward(rendering.state, counted[..., None].repeat(3, 2), nothing).rgb[:, 0].copy()
-                         for counted in (specks, np.ones_like(specks))])  # the next one takes the same memory
+        return np.stack([added_alpha(rendering, specks), added_alpha(rendering)])
 
     some = list(views.items())[::-(-len(views) // FRAMES)]
     in_specks, added = np.sum(side_by_side(of_frame, some), 0)

@@ -12,8 +12,9 @@ from gsac.avatar.binding import FaceFrames, bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.avatar.light import shade
-from gsac.avatar.raster import render_backward, render_bound
+from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
+from gsac.stages.train.gaussians.added_alpha import added_alpha
 from gsac.stages.train.gaussians.disc_area import divisible_areas
 from gsac.stages.train.gaussians.nearest import find_nearest
 
@@ -34,12 +35,8 @@ SPARSE = 3000
 
 def front_pixels(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera,
                  workspace: Workspace) -> np.ndarray:
-    """(N,) pixels that each gaussian adds to one image from its front. vertices: (V, 3) m, camera frame; faces: (F, 3).
-
-    The pixels it adds are the gradient of the sum of all pixels by its colour.
-    """
-    rendering = render_bound(vertices, faces, gaussians, camera, workspace)
-    added = render_backward(rendering.state, np.ones_like(rendering.rgb), np.zeros_like(rendering.alpha)).rgb[:, 0]
+    """(N,) pixels that each gaussian adds to one image from its front. vertices: (V, 3) m, camera frame; faces: (F, 3)."""
+    added = added_alpha(render_bound(vertices, faces, gaussians, camera, workspace))
     frames = face_frames(vertices, faces)
     normal, place = frames.R[gaussians.face, :, 1], frames.T[gaussians.face]
     facing = -(normal * place).sum(1) / np.maximum(np.linalg.norm(place, axis=1), 1e-9)
