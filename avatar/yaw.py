@@ -24,7 +24,7 @@ def turn_seen(turns: np.ndarray) -> float:
 def degrees_covered(yaws: np.ndarray) -> float:
     """yaws: (T,) rad. How many of 360 degrees they cover: all but the widest gap between them."""
     at = np.sort(np.degrees(yaws) % 360)
-    return 360 - float(np.diff(at, append=at[0] + 360).max()) if len(at) else 0.0
+    return max(0.0, 360 - float(np.diff(at, append=at[0] + 360).max())) if len(at) else 0.0  # one's gap may round above 360
 
 
 def name_side(yaw: float) -> str:

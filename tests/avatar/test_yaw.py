@@ -25,6 +25,10 @@ def test_no_frame_shows_no_turn():
     assert turn_seen(np.zeros((0, 3, 3))) == 0
 
 
+def test_one_frame_covers_nothing_and_never_less():
+    assert [f"{turn_seen(turning([degrees])):.0f}" for degrees in np.linspace(0, 359, 50)] == ["0"] * 50
+
+
 def test_the_side_that_the_camera_sees_has_a_name():
     """Turned to the own left, a body shows its right side."""
     seen = [name_side(angle) for angle in yaw(turning([0, 40, 90, 179, -179, -90, -40]))]
