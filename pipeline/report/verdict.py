@@ -57,6 +57,8 @@ LEAST_PX = {"body": 160, "face": 20, "hands": 12}
 """px of person, face and hand in the frames below which nothing better than fair can be told."""
 SEEN = (0.9, 0.65)
 """Least share of the surface in view, for good and for fair."""
+FACELESS = {"head", "face"}
+"""Parts, of `unseen_parts`, without which nothing is like the person."""
 TORN = (0.004, 0.012)
 """Most alpha off the body, or missing on it, in poses never seen, over the body's area, for good and for fair."""
 
@@ -83,7 +85,7 @@ def give_verdict(metrics: dict[str, Any], facts: dict[str, float]) -> Verdict:
     """metrics: train's metrics.json, {} without one; facts: figures of the sheets, as far as measured."""
     grades = {part: grade_likeness(part, metrics, facts) for part in LIKENESS}
     grades |= {"seen": grade_seen(metrics, facts), "moves": grade_moves(metrics)}
-    whole = grade_whole(grades)
+    whole = grade_whole(grades, faceless=not FACELESS.isdisjoint(unseen_parts(metrics)))
     parts = tuple(Part(NAMES[part], grade, say_seen(metrics, facts) if part == "seen" else say_part(part, grade, metrics))
                   for part, grade in grades.items())
     return Verdict(whole, say_in_one_line(grades), parts)
@@ -105,12 +107,13 @@ def grade_likeness(part: str, metrics: dict[str, Any], facts: dict[str, float]) 
 
 
 def grade_seen(metrics: dict[str, Any], facts: dict[str, float]) -> Grade:
-    """How much of the body's surface the frames show; fair at best of a part of a turn, which shows much of it from aside."""
+    """How much of the body's surface the frames show; fair at best of a part of a turn, which shows much of it from aside, and of
+    a body of which a part is missing."""
     share = number(metrics.get("seen_area"))
     if share is None:
         return Grade.UNKNOWN
-    all_round = facts.get("turn_degrees", TURN) >= TURN
-    return Grade.GOOD if share >= SEEN[0] and all_round else Grade.FAIR if share >= SEEN[1] else Grade.POOR
+    whole = facts.get("turn_degrees", TURN) >= TURN and not unseen_parts(metrics)
+    return Grade.GOOD if share >= SEEN[0] and whole else Grade.FAIR if share >= SEEN[1] else Grade.POOR
 
 
 def grade_moves(metrics: dict[str, Any]) -> Grade:
@@ -122,14 +125,20 @@ def grade_moves(metrics: dict[str, Any]) -> Grade:
     return Grade.GOOD if worst <= TORN[0] else Grade.FAIR if worst <= TORN[1] else Grade.POOR
 
 
-def grade_whole(grades: dict[str, Grade]) -> Grade:
-    """That of the body; with a face that is not good it is fair at best, as with what is poor elsewhere."""
+def grade_whole(grades: dict[str, Grade], faceless: bool) -> Grade:
+    """That of the body; with a face that is not good it is fair at best, as with what is poor elsewhere. faceless: no frame shows
+    the face."""
     body, face, poor = grades["body"], grades["face"], Grade.POOR
     if body is Grade.UNKNOWN or body is poor:
         return body
     if face is poor and body is Grade.FAIR:
         return poor
-    return Grade.FAIR if face is Grade.FAIR or poor in grades.values() else body
+    return Grade.FAIR if faceless or face is Grade.FAIR or poor in grades.values() else body
+
+
+def unseen_parts(metrics: dict[str, Any]) -> list[str]:
+    """Names of the parts of the body that no frame shows; none of an avatar of before they were written down."""
+    return metrics.get("unseen_parts") or []
 
 
 def say_part(part: str, grade: Grade, metrics: dict[str, Any]) -> str:
@@ -144,10 +153,11 @@ def say_seen(metrics: dict[str, Any], facts: dict[str, float]) -> str:
     share = number(metrics.get("seen_area"))
     if share is None:
         return "How much of the body the frames show is not known."
-    rest = "" if share >= SEEN[0] else " The rest has the colours of what lies around it."
+    rest = "" if share >= SEEN[0] and not unseen_parts(metrics) else " The rest has the colours of what lies around it."
     turn = facts.get("turn_degrees", TURN)
     from_part = f", from {turn:.0f} of 360 degrees" if turn < TURN else ""
-    return f"The frames show {share:.0%} of the body's surface{from_part}.{rest}"
+    missing = ", but not " + ", ".join(f"the {part}" for part in unseen_parts(metrics)) if unseen_parts(metrics) else ""
+    return f"The frames show {share:.0%} of the body's surface{from_part}{missing}.{rest}"
 
 
 def say_in_one_line(grades: dict[str, Grade]) -> str:

@@ -118,7 +118,7 @@ def run(job: Job) -> None:
     run = Run(job, Poses(body, params), camera, views, trained, held, choosing, turn)
     run.fit()
     area = run.write()
-    if parts := unseen_parts(run.result.gaussians.face, run.result.seen, body):
+    if parts := run.unseen:
         job.warn(Finding.of(Code.PART_UNSEEN, parts=", ".join(parts)))
     if area < LEAST_SEEN:
         job.warn(Finding.of(Code.LITTLE_SEEN, figure=area))
@@ -215,6 +215,11 @@ class Run:
         self.result = RECIPES[config.recipe, self.job.device](task)
         self.seconds, self.cpu_seconds = self.clock()
         require_finite("after the last step", named_result(self.result.gaussians, self.poses))
+
+    @cached_property
+    def unseen(self) -> list[str]:
+        """`unseen_parts` of the result."""
+        return unseen_parts(self.result.gaussians.face, self.result.seen, self.poses.body)
 
     def coarser(self) -> Iterator[Gaussians]:
         """The coarser levels, each once it is fitted."""
@@ -384,7 +389,7 @@ class Run:
             "lpips_in_loss": self.in_loss == NETWORKS[0], **({"vgg_hed_in_loss": True} if self.in_loss == VGG_HED else {}),
             "levels": looking.result(),
             "likeness": likeness,
-            "seen_area": seeing.result(), "turn_degrees": self.turn,
+            "seen_area": seeing.result(), "unseen_parts": self.unseen, "turn_degrees": self.turn,
             "unseen_gaussians": int((~self.result.seen).sum()),
             **bending.result(),
             "curve": [{key: value for key, value in row.items() if key not in TIMES} for row in self.curve],

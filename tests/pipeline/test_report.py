@@ -530,6 +530,16 @@ def test_a_disfigured_face_or_an_unseen_side_is_never_called_good():
     assert verdict(torn_alpha=0.05)[1]["In new poses"] is Grade.POOR
 
 
+def test_an_avatar_without_a_part_of_the_person_is_not_seen_from_all_sides_and_without_a_face_never_good():
+    grade, parts = verdict(likeness=GOOD_FACE, unseen_parts=["left foot"])
+    assert grade is Grade.GOOD and parts["Seen from all sides"] is Grade.FAIR
+    grade, parts = verdict(likeness=GOOD_FACE | {"face": None}, unseen_parts=["head", "left foot"])
+    assert grade is Grade.FAIR and parts["Seen from all sides"] is Grade.FAIR
+    given = give_verdict({"seen_area": 0.93, "unseen_parts": ["head", "left foot"]}, {})
+    assert ("The frames show 93% of the body's surface, but not the head, the left foot. The rest has the colours of what lies "
+            "around it.") in [part.sentence for part in given.parts]
+
+
 def test_decibel_of_the_mask_the_pose_or_the_size_and_the_number_of_gaussians_do_not_touch_the_verdict():
     low = {"psnr_fg": 19.8, "psnr_fg_ttpo": 21.0, "ssim": 0.8, "alpha_iou": 0.85, "image_size": [608, 1080]}
     assert verdict(**low, n_gaussians=100, unseen_gaussians=51) == verdict()
