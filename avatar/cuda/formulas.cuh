@@ -363,11 +363,17 @@ FORMULA void adam_pulled(real &value, real grad, real &first, real &second, int 
 }
 
 // Bounds of stages/train/gaussians/kernels.py `limit`, for one gaussian.
-template <class real> struct Bounds { real needle, least, largest, reach; };
+template <class real> struct Bounds { real needle, least, largest, reach, tie; bool tied; };
 
 template <class real>
 FORMULA void limit(real *mu, real *quat, real *log_scale, real *rgb, real &logit, const real *start, real face_scale,
                    const Bounds<real> &bounds, real pull) {
+    real far = bounds.reach;
+    if (bounds.tied) {
+        far = fmin(far, bounds.tie);
+        quat[1] = quat[3] = 0;
+        log_scale[1] = fmin(log_scale[1], fmin(log_scale[0], log_scale[2]) + log(real(0.4)));
+    }
     real norm = quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3];
     norm = norm > real(1e-20) ? 1 / sqrt(norm) : real(0);
     for (int c = 0; c < 4; ++c) quat[c] *= norm;
@@ -384,8 +390,8 @@ FORMULA void limit(real *mu, real *quat, real *log_scale, real *rgb, real &logit
         away += (mu[c] - start[c]) * (mu[c] - start[c]);
     }
     away = sqrt(away) * face_scale;
-    if (away > bounds.reach)
-        for (int c = 0; c < 3; ++c) mu[c] = start[c] + (mu[c] - start[c]) * bounds.reach / away;
+    if (away > far)
+        for (int c = 0; c < 3; ++c) mu[c] = start[c] + (mu[c] - start[c]) * far / away;
     for (int c = 0; c < 3; ++c) rgb[c] = fmin(fmax(rgb[c], real(0)), real(1));
     logit = fmin(fmax(logit, real(-9)), real(9));
 }

@@ -44,8 +44,12 @@ class Recipe:
     needle: float = math.inf
     least: float = 0.0
     """Shortest axis of a gaussian, m at rest."""
-    largest: float = math.inf
-    """Longest axis of a gaussian, m at rest."""
+    largest: float | np.ndarray = math.inf
+    """Longest axis of a gaussian, m at rest; (F,) by the face that carries it."""
+    tied: bool | np.ndarray = False
+    """Whether gaussians stay flat on their face and near their start; (F,) by face."""
+    tie: float = math.inf
+    """m at rest that those may move away from their start."""
     reach: float = math.inf
     place_pull: float = 0.0
     turn_unit: float = 1.0

@@ -35,6 +35,7 @@ POINTERS = {
     "pose": "double", "fit": "double", "pose_first": "double", "pose_second": "double", "pose_share": "double", "pose_steps": "int",
     "mu": "float", "quat": "float", "log_scale": "float", "rgb": "float", "logit": "float", "first": "float", "second": "float",
     "start": "float", "face_scale": "float", "seen": "int", "clip_light": "float", "resting": "unsigned char",
+    "largest": "float", "tied": "unsigned char",
     "local": "float", "transform": "float", "vertices": "float", "grad_vertices": "float", "corner_grad": "float",
     "joint_grad": "float", "splat": "float", "box": "unsigned short", "slot_start": "int", "depth": "float", "rank": "int",
     "list": "unsigned long long", "moments": "float", "tile_count": "int", "tile_start": "int", "tile_check": "int",
@@ -56,8 +57,8 @@ POINTERS = {
 }
 NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, "levels": INT, "max_tiles": INT, "max_pixels": INT,
            "pair_room": INT, "ssim": FLOAT, "sobel": FLOAT, "mask": FLOAT, "pose_pull": FLOAT, "turn_unit": FLOAT,
-           "shift_unit": FLOAT, "low_pass_px2": FLOAT, "low_pass_energy": INT, "needle": FLOAT, "least": FLOAT, "largest": FLOAT,
-           "reach": FLOAT, "smoothness": FLOAT,
+           "shift_unit": FLOAT, "low_pass_px2": FLOAT, "low_pass_energy": INT, "needle": FLOAT, "least": FLOAT, "reach": FLOAT,
+           "tie": FLOAT, "smoothness": FLOAT,
            "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
            "area": FLOAT, "half_side": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT,
            "masked": INT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,

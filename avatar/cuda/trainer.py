@@ -216,7 +216,7 @@ class CudaTrainer:
         self._make_scratch()
 
     def _upload_gaussians(self, values: dict[str, np.ndarray]) -> None:
-        upload_gaussians(self.arrays, values, self.face, self.light, self.body)
+        upload_gaussians(self.arrays, values, self.face, self.light, self.body, self.recipe)
 
     def _values(self, gaussians: Any) -> dict[str, np.ndarray]:
         """Buffer's name -> its content, (N, ...). gaussians: those that this kind of trainer starts from."""
@@ -235,7 +235,7 @@ class CudaTrainer:
         scene.low_pass_px2, scene.low_pass_energy = self.low_pass.px2, self.low_pass.keeps_energy
         scene.max_pixels = max(h * w for h, w in sizes)
         scene.max_tiles = max(-(-h // TILE) * -(-w // TILE) for h, w in sizes)
-        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "least", "largest", "reach",
+        for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "least", "reach", "tie",
                      "offset_every", "expression_unit", "joint_unit", "fresh", "tiny"):
             setattr(scene, name, getattr(recipe, name))
 

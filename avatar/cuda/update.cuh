@@ -113,7 +113,7 @@ extern "C" __global__ void __launch_bounds__(128) gaussian_step(Scene s) {
     adam_row(rgb, g.rgb, first + 10, second + 10, 3, n, plan.rgb);
     adam_row(&logit, &g.logit, first + 13, second + 13, 1, n, plan.opacity);
     float start[3] = {s.start[3 * i], s.start[3 * i + 1], s.start[3 * i + 2]};
-    Bounds<float> bounds = {s.needle, s.least, s.largest, s.reach};
+    Bounds<float> bounds = {s.needle, s.least, s.largest[i], s.reach, s.tie, s.tied[i] != 0};
     limit(mu, quat, log_scale, rgb, logit, start, s.face_scale[i], bounds, plan.place_pull);
     for (int c = 0; c < 14; ++c) {
         s.first[size_t(c) * s.count + i] = first[c];

@@ -119,12 +119,15 @@ def _upload_betas(arrays: Arrays, body: BodyArrays) -> None:
 
 
 def upload_gaussians(arrays: Arrays, values: dict[str, np.ndarray], face: np.ndarray, light: np.ndarray | None,
-                     body: BodyArrays) -> None:
-    """Gaussians with empty Adam moments. values: buffer's name -> (N, ...); face: (N,); light: (4, 3) of the clip."""
+                     body: BodyArrays, recipe: Recipe) -> None:
+    """Gaussians with empty Adam moments. values: buffer's name -> (N, ...); face: (N,); light: (4, 3) of the clip; recipe: with
+    their limits."""
     scene = arrays.scene
     scale = face_frames(body.rest[0], body.faces).k[face]
-    for name, array in (*values.items(), ("face_scale", scale)):
+    largest, tied = (np.broadcast_to(limit, len(body.faces))[face] for limit in (recipe.largest, recipe.tied))
+    for name, array in (*values.items(), ("face_scale", scale), ("largest", largest)):
         arrays.upload(name, array, np.float32)
+    arrays.upload("tied", tied, np.uint8)
     if light is not None:
         arrays.upload("clip_light", light, np.float32)
     start, item = face_corners(body.faces, face, scene.vertex_count)

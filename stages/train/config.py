@@ -25,8 +25,8 @@ SMALL, LARGE = (3e4, 0.15), (1.6e5, 0.8)
 ones have little that half the size does not show. A longer training has no more of these steps than one of the CPU's."""
 SIZES = 3000, 30000
 """Least and most gaussians where none are asked for: `FULL_SIZE` for a person of `LARGE`, half as many for a quarter of it."""
-MORE_ON_CUDA = 1.5
-"""Factor on them on the GPU, where they cost least."""
+MORE = {"cpu": 1.15, "cuda": 1.5}
+"""Factor on them by device: joints take some more, and on a GPU they cost least."""
 NETWORKS = ("lpips-vgg", "lpips-alex")
 VGG_HED = "vgg-hed"
 """The network whose features take the place of LPIPS in the loss; it is no LPIPS, and its figure has its own name."""
@@ -48,8 +48,7 @@ def coarse_steps(pixels: float, steps: int) -> int:
 
 def asked_size(pixels: float, device: str) -> int:
     """Gaussians that a person of so many pixels in a frame asks for on `device` (cpu, cuda)."""
-    more = MORE_ON_CUDA if device == "cuda" else 1.0
-    return round(min(max(more * FULL_SIZE * (pixels / LARGE[0]) ** 0.5, SIZES[0]), SIZES[1]), -3)
+    return round(min(max(MORE[device] * FULL_SIZE * (pixels / LARGE[0]) ** 0.5, SIZES[0]), SIZES[1]), -3)
 
 
 def read_numbers(text: int | str) -> list[int]:

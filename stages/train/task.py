@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.gaussians.coarser import Coarser
+from gsac.stages.train.gaussians.joint_limits import find_growth
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
@@ -48,6 +50,11 @@ class Task:
     """The network in the loss, where LPIPS or VGG features are wanted there and the weights are here."""
     gpu_seconds: float = 0.0
     """Seconds on the GPU before the steps: the rounds that move the poses."""
+
+    @cached_property
+    def growth(self) -> np.ndarray:
+        """(F,) of `find_growth`; it depends on the body as fitted alone, so a resumed training has the same."""
+        return find_growth(self.poses, self.trained)
 
 
 @dataclass

@@ -29,6 +29,7 @@ from gsac.stages.train.fast.refit import Pace, refit_config, refit_steps
 from gsac.stages.train.fast.trainer import Trainer, learned_values
 from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians import cloth_offsets
+from gsac.stages.train.gaussians.joint_limits import TIE, limit_where_grown
 from gsac.stages.train.gaussians.mean_of_steps import MeanOfSteps
 from gsac.stages.train.gpu import LPIPS_STEPS, hand_back, open_trainer, train_until
 from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
@@ -58,7 +59,7 @@ class Cuda(Backend):
         gaussians = init_gaussians(task, coarse, count)
         steps = task.config.steps or FAST_STEPS["cuda"]
         recipe = make_recipe(task.config, count, coarse_share=coarse_steps(schedule.person_pixels(task), steps) / steps,
-                             least=schedule.shortest_axis(task), **lpips_options(task))
+                             least=schedule.shortest_axis(task), **limits_at_joints(task, count), **lpips_options(task))
         with (open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer,
               self.open_equations(task, gaussians, coarse) as equations):
             self.train_correcting(trainer, task, equations, math.ceil(recipe.offset_share * recipe.steps))
@@ -99,7 +100,7 @@ class Cuda(Backend):
         where = {int(t): k for k, t in enumerate(task.trained)}
         rounds = [cuda_rounds.Round(np.array([where[int(t)] for t in one.frames]), one.backgrounds, one.done) for one in plan]
         recipe = make_recipe(task.config, len(gaussians), RoundsRecipe, rounds=rounds, steps=sum(len(one.frames) for one in rounds),
-                             least=schedule.shortest_axis(task), **POSES_STAY)
+                             least=schedule.shortest_axis(task), **limits_at_joints(task, len(gaussians)), **POSES_STAY)
         with open_trainer(RoundsTrainer, task.poses, task.trained, [views], gaussians, recipe) as trainer:
             yield CudaRounds(trainer, task, gaussians)
             task.gpu_seconds += trainer.seconds
@@ -188,6 +189,12 @@ def make_recipe(config: TrainConfig, count: int, kind: type[SomeRecipe] = Recipe
              "gain_rate": schedule.GAIN_RATE if config.exposure else 0.0, "turn_unit": TURN, "shift_unit": SHIFT,
              "expression_unit": EXPRESSION, "joint_unit": JOINT, "hand_share": HAND_SHARE}
     return kind.of(config, **(given | more))
+
+
+def limits_at_joints(task: Task, count: int) -> dict[str, Any]:
+    """Fields of a recipe for the limits of `count` gaussians where joints bend, for `make_recipe`."""
+    longest, tied = limit_where_grown(task.growth, schedule.longest_axis(task.config, count))
+    return {"largest": longest, "tied": tied, "tie": TIE}
 
 
 def lpips_options(task: Task) -> dict[str, Any]:

@@ -38,6 +38,7 @@ from gsac.stages.train.finite import named_gradients, named_pose, require_finite
 from gsac.stages.train.gaussians.barely_seen import hold_barely_seen
 from gsac.stages.train.gaussians.cloth_offsets import Offsets, fold
 from gsac.stages.train.gaussians.first_colours import fill_unseen
+from gsac.stages.train.gaussians.joint_limits import TIE, limit_nowhere, limit_where_grown
 from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on_background, through_background
 from gsac.stages.train.gaussians.unseen import find_seen, flatten_unseen, front_pixels, level_heights
 from gsac.stages.train.poses.guessed_limbs import find_guessed_faces
@@ -91,7 +92,9 @@ class Trainer:
     """Gaussians with Adam's state, and steps of the optimisation."""
 
     def __init__(self, gaussians: Gaussians, task: Task, frozen_body: bool = False, scale: float = 1.0):
-        """frozen_body: the surface and the poses stay where they are; scale: size that it is drawn at, of the images'."""
+        """frozen_body: the surface and the poses stay where they are, and no joint limits gaussians; scale: size that it is drawn
+        at, of the images'.
+        """
         self.config, self.poses = task.config, task.poses
         self.rest = task.poses.rest(int(task.trained[0]))[0]
         self.frozen_body, self.pose_rate = frozen_body, task.config.pose_rate
@@ -102,7 +105,9 @@ class Trainer:
         self.first = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.second = {name: np.zeros(v.shape) for name, v in self.values.items()}
         self.count = np.zeros(len(self.face), np.int64)
-        self.start, self.largest = self.values["mu"].copy(), longest_axis(task.config, len(self.face))
+        longest = longest_axis(task.config, len(self.face))
+        limits = limit_nowhere(len(self.faces), longest) if frozen_body else limit_where_grown(task.growth, longest)
+        self.start, self.largest, self.tied = self.values["mu"].copy(), limits.longest[self.face], limits.tied[self.face]
         self.least = shortest_axis(task, scale)
         self.face_scale = face_frames(self.rest, self.faces).k[self.face].astype(np.float64)
         self.gains: dict[int, np.ndarray] = {}
@@ -304,7 +309,7 @@ class Trainer:
         for name, rate in rates.items():
             adam_rows(v[name][own], grads[name][own], self.first[name][own], self.second[name][own], bias, rate)
         limit(v["mu"][own], v["quat"][own], v["log_scale"][own], v["rgb"][own], v["opacity_logit"][own], self.start[own],
-              self.face_scale[own], config.needle, self.least, self.largest, self.reach,
+              self.face_scale[own], self.largest[own], self.tied[own], config.needle, self.least, self.reach, TIE,
               config.place_pull * rates["mu"] / max(config.mu_rate, 1e-12))
 
 

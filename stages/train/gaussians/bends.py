@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.stages.train.poses.poses import Poses
-
 BENDS = (
     {"elbow": (0, -115, 0)},
     {"shoulder": (0, 0, 60), "collar": (0, 0, 15)},
@@ -21,8 +19,8 @@ BENDS = (
 """What is bent in each sampled pose; the other joints stay as the clip has them."""
 
 
-def usual_pose(poses: Poses, frames: np.ndarray) -> np.ndarray:
-    """(55, 3) axis-angle, the median pose of frames (n,), upright before the camera."""
-    out = np.median(poses.pose[frames], 0)
+def usual_pose(pose: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """(55, 3) axis-angle, the median of frames (n,), upright before the camera. pose: (T, 55, 3) axis-angle."""
+    out = np.median(pose[frames], 0)
     out[0] = 0
     return out

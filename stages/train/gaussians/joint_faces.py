@@ -64,7 +64,7 @@ class BentFaces(NamedTuple):
 def bend_faces(poses: Poses, frames: np.ndarray) -> BentFaces:
     """Joints and faces as `BENDS` have them. frames: (n,) trained ones, whose median pose is the usual one."""
     body, (rest, joints) = poses.body, poses.rest(int(frames[0]))
-    usual = usual_pose(poses, frames)
+    usual = usual_pose(poses.pose, frames)
 
     def carry(pose: np.ndarray, _: Workspace) -> Posed:
         return Posed(joint_transforms(pose[None], joints, body.parents)[0].astype(np.float32),

@@ -79,7 +79,7 @@ class BentSilhouettes(NamedTuple):
 
 def bend_silhouettes(poses: Poses, frames: np.ndarray) -> BentSilhouettes:
     """The silhouettes as `BENDS` have them. frames: (n,) trained ones, whose median pose is the usual one."""
-    pose, faces = usual_pose(poses, frames), poses.body.faces
+    pose, faces = usual_pose(poses.pose, frames), poses.body.faces
     bent = side_by_side(lambda turns, _: see(put_in_pose(poses, int(frames[0]), turn_joints(pose, turns)), faces), BENDS)
     return BentSilhouettes(faces, place(put_in_pose(poses, int(frames[0]), pose), faces), bent)
 

@@ -9,6 +9,9 @@ import numpy as np
 from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import Share
 
+FLAT = 0.4
+"""Most of a tied gaussian's thickness over its narrower width."""
+
 
 def on_background(share: Share, rgb: np.ndarray, alpha: np.ndarray, pixels: np.ndarray, background: np.ndarray, gain: np.ndarray,
                   image: np.ndarray, target: np.ndarray, spans: np.ndarray) -> None:
@@ -125,15 +128,21 @@ def count_rows(grad, count, bias):
 
 
 @own_kernel(nogil=True, error_model="numpy")
-def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, least, largest, reach, pull):
+def limit(mu, quat, log_scale, rgb, logit, start, face_scale, largest, tied, needle, least, reach, tie, pull):
     """Limits gaussians after a step, in place.
 
     quat (N, 4) is normalised; the longest axis is at most `needle` times the middle one and 10 times the shortest, and
-    at most `largest` m, the shortest at least `least` m; mu (N, 3) moves back to start (N, 3) by the share `pull` and stays
-    within `reach` m of it; rgb stays in 0..1 and the opacity's logit in -9..9. face_scale: (N,) m per unit of mu at rest.
+    at most largest (N,) m, the shortest at least `least` m; mu (N, 3) moves back to start (N, 3) by the share `pull` and stays
+    within `reach` m of it; rgb stays in 0..1 and the opacity's logit in -9..9. face_scale: (N,) m per unit of mu at rest. One
+    that is tied (N,) lies flat, its middle axis, the face's normal, at most `FLAT` times the others, within `tie` m of its start.
     """
     log_needle, log_flat = math.log(needle), math.log(10.0)
     for i in range(mu.shape[0]):
+        far = reach
+        if tied[i]:
+            far = min(reach, tie)
+            quat[i, 1], quat[i, 3] = 0, 0
+            log_scale[i, 1] = min(log_scale[i, 1], min(log_scale[i, 0], log_scale[i, 2]) + math.log(FLAT))
         norm = 0.0
         for c in range(4):
             norm += quat[i, c] * quat[i, c]
@@ -146,7 +155,7 @@ def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, least, lar
         high, low = max(a, b, d), min(a, b, d)
         middle = a + b + d - high - low
         size = max(face_scale[i], 1e-6)
-        top = min(high, middle + log_needle, math.log(largest / size))
+        top = min(high, middle + log_needle, math.log(largest[i] / size))
         bottom = top - log_flat
         if least > 0:
             bottom = max(bottom, math.log(least / size))
@@ -157,9 +166,9 @@ def limit(mu, quat, log_scale, rgb, logit, start, face_scale, needle, least, lar
             mu[i, c] -= pull * (mu[i, c] - start[i, c])
             away += (mu[i, c] - start[i, c]) ** 2
         away = math.sqrt(away) * face_scale[i]
-        if away > reach:
+        if away > far:
             for c in range(3):
-                mu[i, c] = start[i, c] + (mu[i, c] - start[i, c]) * reach / away
+                mu[i, c] = start[i, c] + (mu[i, c] - start[i, c]) * far / away
         for c in range(3):
             rgb[i, c] = min(max(rgb[i, c], 0.0), 1.0)
         logit[i, 0] = min(max(logit[i, 0], -9.0), 9.0)

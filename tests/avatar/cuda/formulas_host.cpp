@@ -207,9 +207,11 @@ void adam_dense(int n, double *value, const double *grad, double *first, double 
 }
 
 void limit_all(int n, double *mu, double *quat, double *log_scale, double *rgb, double *logit, const double *start,
-               const double *face_scale, double needle, double least, double largest, double reach, double pull) {
-    Bounds<double> bounds = {needle, least, largest, reach};
-    for (int i = 0; i < n; ++i)
+               const double *face_scale, const double *largest, const int *tied, double needle, double least, double reach,
+               double tie, double pull) {
+    for (int i = 0; i < n; ++i) {
+        Bounds<double> bounds = {needle, least, largest[i], reach, tie, tied[i] != 0};
         limit(mu + 3 * i, quat + 4 * i, log_scale + 3 * i, rgb + 3 * i, logit[i], start + 3 * i, face_scale[i], bounds, pull);
+    }
 }
 }

@@ -142,9 +142,10 @@ def test_adam_and_limits_are_those_of_the_cpu_path(host):
               rng.normal(0, 9, (n, 1))]
     values[1][0] = 0
     start, face_scale = rng.normal(size=(n, 3)), rng.uniform(0, 0.2, n)
+    largest, tied = rng.uniform(0.01, 0.05, n), rng.integers(0, 2, n, np.int32)
     ours, theirs = [v.copy() for v in values], [v.copy() for v in values]
-    host("limit_all", n, *ours, start, face_scale, 4.0, 0.004, 0.05, 0.08, 1e-3)
-    kernels.limit(*theirs, start, face_scale, 4.0, 0.004, 0.05, 0.08, 1e-3)
+    host("limit_all", n, *ours, start, face_scale, largest, tied, 4.0, 0.004, 0.08, 0.003, 1e-3)
+    kernels.limit(*theirs, start, face_scale, largest, tied > 0, 4.0, 0.004, 0.08, 0.003, 1e-3)
     for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-12, atol=1e-14)
 

@@ -50,7 +50,7 @@ def test_sizes_and_coarse_steps_follow_from_the_pixels_of_the_person():
     (small, least), (large, most) = config.SMALL, config.LARGE
     sizes = [schedule.budget(filmed(int(pixels)), "cpu") for pixels in (100, large / 4, large, 9.9e5)]
     assert sizes == [config.SIZES[0], config.FULL_SIZE / 2, config.FULL_SIZE, config.SIZES[1]]
-    assert schedule.budget(filmed(int(large)), "cuda") == config.FULL_SIZE * config.MORE_ON_CUDA
+    assert schedule.budget(filmed(int(large)), "cuda") == config.FULL_SIZE * config.MORE["cuda"]
     assert schedule.budget(filmed(int(large), gaussians=700), "cuda") == 700
     shares = [config.coarse_share(pixels) for pixels in (100, small, (small * large) ** 0.5, large, 9.9e5)]
     np.testing.assert_allclose(shares, [least, least, (least + most) / 2, most, most], rtol=1e-4)

@@ -94,10 +94,13 @@ def test_no_needle_speck_giant_or_floater_survives_the_limits():
     quat[0] = 0
     log_scale, rgb, logit = rng.normal(0, 5, (n, 3)), rng.normal(0, 2, (n, 3)), rng.normal(0, 20, (n, 1))
     k = rng.uniform(0.05, 1, n)
-    limit(mu, quat, log_scale, rgb, logit, start, k, 4.0, 0.002, 0.05, 0.08, 0.0)
+    largest, tied = rng.uniform(0.03, 0.05, n), np.arange(n) % 3 == 0
+    limit(mu, quat, log_scale, rgb, logit, start, k, largest, tied, 4.0, 0.002, 0.08, 0.003, 0.0)
     scales = np.sort(np.exp(log_scale), axis=1)
     assert (scales[:, 2] <= 4.0 * scales[:, 1] * 1.0001).all() and (scales[:, 2] <= 10.001 * scales[:, 0]).all()
-    assert (scales[:, 2] * k <= 0.05001).all() and (scales[:, 0] * k >= 0.00199).all()
-    assert (np.linalg.norm(mu - start, axis=1) * k <= 0.08001).all()
+    assert (scales[:, 2] * k <= largest * 1.001).all() and (scales[:, 0] * k >= 0.00199).all()
+    assert (np.linalg.norm(mu - start, axis=1) * k <= np.where(tied, 0.00301, 0.08001)).all()
+    assert not quat[tied][:, [1, 3]].any() and quat[~tied][:, [1, 3]].all()
+    assert (np.exp(log_scale[tied, 1]) <= np.exp(log_scale[tied][:, [0, 2]].min(1)) * 1.0001).all()
     np.testing.assert_allclose(np.linalg.norm(quat, axis=1), 1)
     assert rgb.min() >= 0 and rgb.max() <= 1 and abs(logit).max() <= 9
