@@ -39,7 +39,7 @@ class JointLimits(NamedTuple):
 
 
 def find_growth(poses: Poses, frames: np.ndarray) -> np.ndarray:
-    """(F,) by how much each face grows in the bend that makes it largest, 1 at least, from the usual pose of the fit.
+    """(F,) float64, by how much each face grows in the bend that makes it largest, 1 at least, from the usual pose of the fit.
 
     frames: (n,) trained ones.
     """
@@ -50,7 +50,7 @@ def find_growth(poses: Poses, frames: np.ndarray) -> np.ndarray:
         return face_frames(body.bend(rest, joints, pose), body.faces).k
 
     as_usual, *bent = side_by_side(sizes, [usual, *(turn_joints(usual, turns) for turns in BENDS)])
-    return np.maximum(np.max(bent, 0) / np.maximum(as_usual, 1e-9), 1)
+    return np.maximum(np.max(bent, 0).astype(np.float64) / np.maximum(as_usual, 1e-9), 1)
 
 
 def density_where_grown(growth: np.ndarray) -> np.ndarray:

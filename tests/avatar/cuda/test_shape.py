@@ -17,8 +17,9 @@ def both():
     from gsac.avatar.cuda.trainer import CudaTrainer
     from gsac.benchmarks.gpu.synthetic_clip import figure, start
     from gsac.stages.train.config import TrainConfig
-    from gsac.stages.train.fast.cuda import make_recipe
+    from gsac.stages.train.fast.cuda import limits_at_joints, make_recipe
     from gsac.stages.train.fast.schedule import shortest_axis
+    from gsac.stages.train.gaussians.joint_limits import find_growth
     from gsac.stages.train.gpu import body_arrays
     from gsac.stages.train.poses.poses import Poses
 
@@ -31,9 +32,11 @@ def both():
         expression = np.random.default_rng(1).random((4, body.exprdirs.shape[2])) * 0.2
         params = BodyParams.from_pose(pose, made.transl, np.zeros(body.num_betas), expression, camera.focal, camera.center)
         config = TrainConfig(steps=steps, expression_rate=1e-2, joint_rate=1e-3)
-        task = SimpleNamespace(config=config, poses=Poses(body, params), trained=np.arange(4), views=made.shots)
+        poses, trained = Poses(body, params), np.arange(4)
+        task = SimpleNamespace(config=config, poses=poses, trained=trained, views=made.shots, growth=find_growth(poses, trained))
         gaussians = start(made.body, 3000)
-        recipe = make_recipe(config, 3000, batch=batch, offset_rate=0.0, least=shortest_axis(task))
+        recipe = make_recipe(config, 3000, batch=batch, offset_rate=0.0, least=shortest_axis(task),
+                             **limits_at_joints(task, 3000))
         arrays = body_arrays(task.poses, task.trained, recipe)
         trainer = CudaTrainer(arrays, [made.shots], task.poses.pose, task.poses.transl, gaussians, recipe)
         opened.append(trainer)
