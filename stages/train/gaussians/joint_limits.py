@@ -21,9 +21,9 @@ TIED_FROM = 1.08
 """Growth of a face from which on its gaussians are tied."""
 TIE = 0.005
 """m at rest that a tied gaussian may move away from its start."""
-SPREAD = 0.003
+SPREAD = 0.006
 """m by which a bend may lengthen a gaussian's longest axis, a standard deviation."""
-LEAST_SHARE = 0.18
+LEAST_SHARE = 0.3
 """Of the longest axis that is allowed elsewhere, what every face allows: fewer gaussians leave no gaps."""
 MOST_DENSE = 4.0
 """Most gaussians on an area that grows, over those elsewhere: as many as keep it covered in the bend."""

@@ -54,7 +54,7 @@ def test_a_whole_training_follows_the_recipe_of_the_cpu(figure, exposure):
     params = BodyParams.from_pose(still.pose, still.transl, np.zeros(body.num_betas), np.zeros((4, len(body.expression_names))),
                                   camera.focal, camera.center)
     task = SimpleNamespace(config=TrainConfig(steps=steps, exposure=exposure), poses=Poses(body, params), trained=np.arange(4),
-                           views=still.shots)
+                           views=still.shots, growth=np.ones(len(body.faces)))
     gaussians = start(still.body, 2000)
     gaussians.light = LIGHT
     cpu, recipe = Trainer(gaussians, task), make_recipe(task.config, 2000, least=shortest_axis(task))

@@ -53,10 +53,10 @@ def test_what_training_does_to_the_poses_does_not_change_the_growth_so_a_resumed
 
 
 def test_the_more_a_face_grows_the_more_and_the_smaller_gaussians_it_has_within_bounds():
-    growth, longest = np.array([1.0, 1.05, 1.2, 1.5, 3.0]), 0.025
-    np.testing.assert_allclose(density_where_grown(growth), [1, 1.05**2, 1.2**2, 1.5**2, MOST_DENSE])
+    growth, longest = np.array([1.0, 1.05, 1.3, 1.6, 3.0]), 0.025
+    np.testing.assert_allclose(density_where_grown(growth), [1, 1.05**2, 1.3**2, 1.6**2, MOST_DENSE])
     limits = limit_where_grown(growth, longest)
-    np.testing.assert_allclose(limits.longest, [longest, longest, SPREAD / 0.2, SPREAD / 0.5, LEAST_SHARE * longest])
+    np.testing.assert_allclose(limits.longest, [longest, longest, SPREAD / 0.3, SPREAD / 0.6, LEAST_SHARE * longest])
     assert limits.tied.tolist() == [False, False, True, True, True]
 
 
