@@ -120,8 +120,10 @@ def _upload_betas(arrays: Arrays, body: BodyArrays) -> None:
 
 def upload_gaussians(arrays: Arrays, values: dict[str, np.ndarray], face: np.ndarray, light: np.ndarray | None,
                      body: BodyArrays, recipe: Recipe) -> None:
-    """Gaussians with empty Adam moments. values: buffer's name -> (N, ...); face: (N,); light: (4, 3) of the clip; recipe: with
-    their limits."""
+    """Gaussians with empty Adam moments.
+
+    values: buffer's name -> (N, ...); face: (N,); light: (4, 3) of the clip; recipe: with their limits.
+    """
     scene = arrays.scene
     scale = face_frames(body.rest[0], body.faces).k[face]
     largest, tied = (np.broadcast_to(limit, len(body.faces))[face] for limit in (recipe.largest, recipe.tied))

@@ -107,8 +107,10 @@ def grade_likeness(part: str, metrics: dict[str, Any], facts: dict[str, float]) 
 
 
 def grade_seen(metrics: dict[str, Any], facts: dict[str, float]) -> Grade:
-    """How much of the body's surface the frames show; fair at best of a part of a turn, which shows much of it from aside, and of
-    a body of which a part is missing."""
+    """How much of the body's surface the frames show.
+
+    Fair at best of a part of a turn, which shows much of it from aside, and of a body of which a part is missing.
+    """
     share = number(metrics.get("seen_area"))
     if share is None:
         return Grade.UNKNOWN
@@ -126,8 +128,10 @@ def grade_moves(metrics: dict[str, Any]) -> Grade:
 
 
 def grade_whole(grades: dict[str, Grade], faceless: bool) -> Grade:
-    """That of the body; with a face that is not good it is fair at best, as with what is poor elsewhere. faceless: no frame shows
-    the face."""
+    """That of the body; with a face that is not good it is fair at best, as with what is poor elsewhere.
+
+    faceless: no frame shows the face.
+    """
     body, face, poor = grades["body"], grades["face"], Grade.POOR
     if body is Grade.UNKNOWN or body is poor:
         return body
