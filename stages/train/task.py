@@ -53,7 +53,7 @@ class Task:
 
     @cached_property
     def growth(self) -> np.ndarray:
-        """(F,) of `find_growth`; it depends on the body as fitted alone, so a resumed training has the same."""
+        """(F,) of `find_growth`, of the body as fitted."""
         return find_growth(self.poses, self.trained)
 
 

@@ -45,7 +45,7 @@ from gsac.stages.train.poses.guessed_limbs import find_guessed_faces
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
 
-KEPT = ("face", "values", "first", "second", "count", "start", "light", "seen")
+KEPT = ("face", "values", "first", "second", "count", "start", "largest", "tied", "light", "seen")
 """Attributes of Trainer that go into a checkpoint as they are."""
 AT_ONCE = 2
 """Steps that are worked out side by side, on any number of cores: results shall not depend on it."""

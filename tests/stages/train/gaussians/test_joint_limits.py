@@ -45,11 +45,20 @@ def test_faces_of_armpits_and_knees_grow_and_those_of_the_head_and_of_the_middle
         assert growth[shared].max() > 1.3
 
 
-def test_what_training_does_to_the_poses_does_not_change_the_growth_so_a_resumed_run_is_limited_alike(task):
+def test_what_training_does_to_the_poses_does_not_change_the_growth(task):
     before = task.growth
     task.poses.pose[:] += 0.1
     del task.__dict__["growth"]
     np.testing.assert_array_equal(task.growth, before)
+
+
+def test_a_resumed_training_has_the_limits_that_it_began_with(task, started):
+    state = Trainer(started[0], task).state()
+    task.growth = np.ones_like(task.growth)
+    resumed = Trainer.from_state(state, task)
+    assert resumed.tied.any()
+    np.testing.assert_array_equal(resumed.tied, state["tied"])
+    np.testing.assert_array_equal(resumed.largest, state["largest"])
 
 
 def test_the_more_a_face_grows_the_more_and_the_smaller_gaussians_it_has_within_bounds():
