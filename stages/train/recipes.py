@@ -35,12 +35,13 @@ def fit_fast(backend: Backend, task: Task) -> Fit:
     with_drift = replace(task, poses=task.poses.copy())
     aside, coarser = ThreadPoolExecutor(2), Coarser()
     finish = aside.submit(Finish, task.poses, task.trained)
-    levels = aside.submit(lod.fit_levels, with_drift, backend, fit, lambda level: finish.result()(level), coarser.add)
+    levels = aside.submit(lod.fit_levels, with_drift, backend, fit, lambda level: finish.result()(level).gaussians, coarser.add)
     levels.add_done_callback(lambda done: coarser.end(done.exception()))
     aside.shutdown(wait=False)
     if backend.device == "cpu" or task.network:  # torch records its graph alone
         wait([levels])
-    return replace(fit, gaussians=finish.result()(fit.gaussians), coarser=coarser)
+    finest, source = finish.result()(fit.gaussians)
+    return replace(fit, gaussians=finest, seen=fit.seen[source], coarser=coarser)
 
 
 BACKENDS: dict[str, Backend] = {"cpu": Cpu(), "cuda": Cuda()}

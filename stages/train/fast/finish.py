@@ -1,11 +1,12 @@
-"""The end of every level: on bones turned back, on faces that carry its gaussians where joints bend, without strays there."""
+"""The end of every level: on bones turned back, cut and on faces that carry its gaussians where joints bend, without strays."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
-from gsac.stages.train.gaussians import joint_faces, joint_strays
+from gsac.stages.train.gaussians import joint_cuts, joint_faces, joint_strays
+from gsac.stages.train.gaussians.joint_cuts import Cut
 from gsac.stages.train.poses.bone_drift import remove_drift
 from gsac.stages.train.poses.poses import Poses
 
@@ -19,6 +20,8 @@ class Finish:
         self.carried = joint_faces.bend_faces(poses, trained)
         self.seen = joint_strays.bend_silhouettes(poses, trained)
 
-    def __call__(self, gaussians: Gaussians) -> Gaussians:
+    def __call__(self, gaussians: Gaussians) -> Cut:
         """The gaussians, of the poses as they were, as they are handed out."""
-        return joint_strays.draw_in_strays(joint_faces.hold_at_joints(self.drift.undo(gaussians), self.carried), self.seen)
+        held = joint_faces.hold_at_joints(self.drift.undo(gaussians), self.carried)
+        cut, source = joint_cuts.cut_at_joints(held, self.carried, self.seen)
+        return Cut(joint_strays.draw_in_strays(joint_faces.hold_at_joints(cut, self.carried), self.seen), source)

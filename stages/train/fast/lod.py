@@ -22,6 +22,7 @@ from gsac.stages.train.fast.initial_gaussians import crop_views
 from gsac.stages.train.fast.refit import FIRM, GENTLE
 from gsac.stages.train.fast.size_search import POSE_ROUNDS, count_pixels, viewing_weight
 from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.gaussians.joint_cuts import uncut
 from gsac.stages.train.gaussians.merge import merge_to_size
 from gsac.stages.train.gaussians.unseen import level_heights
 from gsac.stages.train.judge.heldout import Candidate, judge_all
@@ -35,7 +36,7 @@ class Level(NamedTuple):
     height: float
     """px, height of the person in the images that this level is fitted to."""
     most: int
-    """Its gaussians, at most."""
+    """Its gaussians, at most, once those are cut that joints would lift."""
 
 
 LEVELS = (Level(600, 8000), Level(360, 4000), Level(150, 1300))
@@ -68,7 +69,7 @@ def fit_levels(task: Task, backend: Backend, fit: Fit, finish: Callable[[Gaussia
         looked_at = aside.submit(find_frames, task, filmed, tall)
         finer_placed = aside.submit(move, finer, task, looked_at)
         for level, scale, views in zip(levels, scales, prefetch(ahead, partial(scale_views, filmed), scales, 1), strict=True):
-            size = min(level.most, round(FEWER * len(finer)))
+            size = min(uncut(level.most), round(FEWER * len(finer)))
             tried, seen = min((one for one in ((finer, finer_seen), *smaller) if len(one[0]) >= size), key=lambda one: len(one[0]))
             worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
             fewer, seen = merge_to_size(tried, seen, worth, size, body, rest)

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from scipy.spatial import KDTree
+
+from gsac.avatar.binding import FaceFrames, face_frames
+from gsac.avatar.mesh import vertex_normals
+from gsac.stages.train.poses.poses import Poses
 
 BENDS = (
     {"elbow": (0, -115, 0)},
@@ -24,3 +31,23 @@ def usual_pose(pose: np.ndarray, frames: np.ndarray) -> np.ndarray:
     out = np.median(pose[frames], 0)
     out[0] = 0
     return out
+
+
+class Placed(NamedTuple):
+    """A posed body's surface in space."""
+
+    frames: FaceFrames
+    tree: KDTree
+    """Of its vertices."""
+    normals: np.ndarray
+    """(V, 3) of the vertices."""
+
+
+def place(posed: np.ndarray, faces: np.ndarray) -> Placed:
+    """The surface of the body posed (V, 3) m. faces: (F, 3)."""
+    return Placed(face_frames(posed, faces), KDTree(posed), vertex_normals(posed, faces))
+
+
+def put_in_pose(poses: Poses, t: int, pose: np.ndarray) -> np.ndarray:
+    """(V, 3) m, the body of frame t in another pose, (55, 3) axis-angle."""
+    return poses.body.bend(*poses.rest(t), pose)

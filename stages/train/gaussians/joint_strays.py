@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from scipy.spatial import KDTree
 
-from gsac.avatar.binding import FaceFrames, bind, face_frames
+from gsac.avatar.binding import bind
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import turn_joints
@@ -22,7 +21,7 @@ from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.gaussians.added_alpha import added_alpha
-from gsac.stages.train.gaussians.bends import BENDS, usual_pose
+from gsac.stages.train.gaussians.bends import BENDS, Placed, place, put_in_pose, usual_pose
 from gsac.stages.train.gaussians.unseen import find_heights
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.poses.turned_body import turn_before_camera
@@ -51,14 +50,6 @@ class Side(NamedTuple):
     """(h, w) m off the silhouette."""
     area: int
     """Pixels of the silhouette, at least 1."""
-
-
-class Placed(NamedTuple):
-    """A posed body's surface in space."""
-
-    frames: FaceFrames
-    tree: KDTree
-    """Of its vertices."""
 
 
 class Bent(NamedTuple):
@@ -122,11 +113,6 @@ def see(posed: np.ndarray, faces: np.ndarray) -> Bent:
     return Bent(place(posed, faces), sides)
 
 
-def place(posed: np.ndarray, faces: np.ndarray) -> Placed:
-    """The surface of the body posed (V, 3) m. faces: (F, 3)."""
-    return Placed(face_frames(posed, faces), KDTree(posed))
-
-
 def find_stray(gaussians: Gaussians, side: Side, faces: np.ndarray, workspace: Workspace) -> np.ndarray:
     """(N,) alpha that each gaussian adds off the silhouette of the body, over its area, seen from a side. faces: (F, 3)."""
     off = OFF * max(1.0, FULL_SIZE / len(gaussians)) ** 0.5
@@ -138,8 +124,3 @@ def find_reach(gaussians: Gaussians, surface: Placed) -> np.ndarray:
     """(N,) m from the body to the ends of the gaussians: of the centre from its vertices, and the longest axis."""
     bound = bind(surface.frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     return surface.tree.query(bound.means)[0] + bound.scales.max(1)
-
-
-def put_in_pose(poses: Poses, t: int, pose: np.ndarray) -> np.ndarray:
-    """(V, 3) m, the body of frame t in another pose, (55, 3) axis-angle."""
-    return poses.body.bend(*poses.rest(t), pose)

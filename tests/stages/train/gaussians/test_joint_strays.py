@@ -9,7 +9,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import INDEX, turn_joints
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.gaussians import joint_strays
-from gsac.stages.train.gaussians.bends import BENDS
+from gsac.stages.train.gaussians.bends import BENDS, put_in_pose
 from gsac.stages.train.gaussians.joint_faces import bind_anew
 from gsac.stages.train.poses.poses import Poses
 
@@ -48,7 +48,7 @@ def carried_by_the_forearm(poses, gaussians):
 
 def stray_of(gaussians, poses, pose):
     """(N,) stray alpha of gaussians in a pose."""
-    seen = joint_strays.see(joint_strays.put_in_pose(poses, 0, pose), poses.body.faces)
+    seen = joint_strays.see(put_in_pose(poses, 0, pose), poses.body.faces)
     return sum(joint_strays.find_stray(gaussians, side, poses.body.faces, Workspace()) for side in seen.sides)
 
 
@@ -96,7 +96,7 @@ def test_fewer_gaussians_which_are_wider_are_left_in_peace(poses):
 
 def test_what_a_growing_armpit_lifts_off_the_body_is_lowered_to_the_surface_around_and_hardly_shrinks(poses, plain):
     at, pose = face_frames(poses.vertices(0), poses.body.faces), turn_joints(poses.pose[0], BENDS[1])
-    raised = face_frames(joint_strays.put_in_pose(poses, 0, pose), poses.body.faces)
+    raised = face_frames(put_in_pose(poses, 0, pose), poses.body.faces)
     growth = (raised.k / np.maximum(at.k, 1e-9))[plain.face]
     armpit = np.flatnonzero((growth > 1.6) & (at.k[plain.face] > 0.2))[::5]
     lifted = plain[np.arange(len(plain))]

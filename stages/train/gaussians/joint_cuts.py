@@ -1,0 +1,122 @@
+"""Long gaussians that would stand off the body where a joint bends: cut in two, each half on a face of its own.
+
+A gaussian that lies along a straight arm may reach past the elbow, and its end stands off as a spike once the elbow bends. Two
+halves look like the whole in the clip's poses, and each bends with the surface below it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gsac.avatar.binding import Bound, FaceFrames, bind, unbind
+from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.threads import Workspace, side_by_side
+from gsac.stages.train.config import FULL_SIZE
+from gsac.stages.train.gaussians.bends import Placed
+from gsac.stages.train.gaussians.joint_faces import BentFaces, bind_anew, face_weights, faces_around
+from gsac.stages.train.gaussians.joint_strays import Bent, BentSilhouettes
+
+EXTENT = 2.0
+"""Standard deviations from the middle of a gaussian to its ends."""
+OFF = 0.016
+"""m farther off the body than in the usual pose that an end of one of `FULL_SIZE` gaussians may be in a bend; fewer are wider."""
+OUTWARD = 0.5
+"""Cosine between the body's normal and the way to an end from which on it is outside."""
+SHORTEST, FAINT = 0.006, 0.05
+"""m, longest axis, and opacity of gaussians that stay whole."""
+ROUNDS = 2
+MOST = 0.05
+"""Gaussians at most that are cut, of all: those whose ends rise most."""
+APART, LENGTH, WIDTH = 0.55, 0.6, 0.967
+"""Of the whole's standard deviation: from its middle to those of the halves, and a half's along the cut axis and across."""
+THINNED = 0.77, 0.11
+"""Opacity of a half: the whole's times the first, and its square times the second. Halves of these numbers have the whole's alpha
+but for 1.3 to 1.7 % of its squares (least squares for opacities of .3 to .95)."""
+
+
+class Cut(NamedTuple):
+    gaussians: Gaussians
+    source: np.ndarray
+    """(N,) indices of the gaussians that they are, or that they are halves of."""
+
+
+def uncut(most: int) -> int:
+    """Gaussians that become at most so many once they are cut."""
+    return int(most / (1 + MOST))
+
+
+def cut_at_joints(gaussians: Gaussians, carried: BentFaces, seen: BentSilhouettes) -> Cut:
+    """The gaussians, those in halves that stand off most where joints bend. carried, seen: the body in the same bends."""
+    out, source, room = gaussians, np.arange(len(gaussians)), int(MOST * len(gaussians))
+    off = OFF * max(1.0, FULL_SIZE / max(len(gaussians), 1)) ** 0.5
+    for _ in range(ROUNDS):
+        length = np.exp(out.log_scale).max(1) * seen.usual.frames.k[out.face]
+        rise = np.where((length > SHORTEST) & (out.opacity > FAINT), find_rise(out, seen, off), 0)
+        worst = np.argsort(-rise, kind="stable")[:room]
+        worst = np.sort(worst[rise[worst] > off])
+        if not len(worst):
+            break
+        out, source, room = halve(out, worst, carried), np.append(source, source[worst]), room - len(worst)
+    return Cut(out, source)
+
+
+def find_rise(gaussians: Gaussians, seen: BentSilhouettes, least: float) -> np.ndarray:
+    """(N,) m that an end of each gaussian stands farther off the body than in the usual pose, in the bend that is worst; any number
+    up to `least` where it is no more than that.
+    """
+    usual = seen.usual
+    ends = find_ends(gaussians, usual.frames)
+    vertex, before = usual.tree.query(ends)[1], find_height(ends, usual)
+
+    def rise(bent: Bent, _: Workspace) -> np.ndarray:
+        there, surface = find_ends(gaussians, bent.surface.frames), bent.surface
+        height = np.zeros(there.shape[:2])
+        far = np.linalg.norm(there - surface.tree.data[vertex], axis=-1) > least  # the nearest vertex is no farther than this one
+        height[far] = find_height(there[far], surface)
+        return (height - before).max(1)
+
+    return np.max(side_by_side(rise, seen.bent), 0)
+
+
+def find_ends(gaussians: Gaussians, frames: FaceFrames) -> np.ndarray:
+    """(N, 4, 3) m, both ends of each gaussian's two longest axes."""
+    bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    longest = np.argsort(-bound.scales, 1)[:, :2]
+    axes = EXTENT * np.take_along_axis(bound.rotations * bound.scales[:, None], longest[:, None], 2).transpose(0, 2, 1)
+    return np.concatenate([bound.means[:, None] + axes, bound.means[:, None] - axes], 1)
+
+
+def find_height(places: np.ndarray, surface: Placed) -> np.ndarray:
+    """(...) m from the body to places (..., 3) m outside of it; 0 inside."""
+    away, vertex = surface.tree.query(places)
+    over = ((places - surface.tree.data[vertex]) * surface.normals[vertex]).sum(-1)
+    return np.where(over > OUTWARD * away, away, 0)
+
+
+def halve(gaussians: Gaussians, which: np.ndarray, carried: BentFaces) -> Gaussians:
+    """The gaussians, `which` (n,) cut across the longest axis: one half each in its place, the others at the end."""
+    at = carried.usual.frames
+    out = gaussians[np.append(np.arange(len(gaussians)), which)]
+    bound = bind(at, out.face, out.mu, out.quat, out.log_scale)
+    halves = np.append(which, np.arange(len(gaussians), len(out)))
+    side = np.repeat([-1.0, 1.0], len(which))
+    longest, thinnest = bound.scales[halves].argmax(1), bound.scales[halves].argmin(1)
+    length, thin = bound.scales[halves, longest], bound.scales[halves, thinnest]
+    bound.means[halves] += (side * APART * length)[:, None] * bound.rotations[halves, :, longest]
+    bound.scales[halves] *= WIDTH
+    bound.scales[halves, thinnest], bound.scales[halves, longest] = thin, LENGTH * length
+    out.mu[halves], out.quat[halves], out.log_scale[halves] = unbind(at, out.face[halves], Bound(*(part[halves] for part in bound)))
+    out.opacity[halves] = out.opacity[halves] * (THINNED[0] + THINNED[1] * out.opacity[halves])
+    face = out.face.copy()
+    face[halves] = find_carrier(out.face[halves], bound.means[halves], carried)
+    return bind_anew(out, face, bound, at)
+
+
+def find_carrier(face: np.ndarray, places: np.ndarray, carried: BentFaces) -> np.ndarray:
+    """(n,) faces nearest to places (n, 3) m in the usual pose, of the part and the side of face (n,)."""
+    at, body = carried.usual.frames, carried.body
+    near, fits = faces_around(Workspace().share, face, places, at, face_weights(body), carried.rest[body.faces])
+    away = np.linalg.norm(at.T[near] - places[:, None], axis=2)
+    return near[np.arange(len(near)), np.where(fits, away, np.inf).argmin(1)]
