@@ -24,4 +24,4 @@ class Finish:
         """The gaussians, of the poses as they were, as they are handed out."""
         held = joint_faces.hold_at_joints(self.drift.undo(gaussians), self.carried)
         cut, source = joint_cuts.cut_at_joints(held, self.carried, self.seen)
-        return Cut(joint_strays.draw_in_strays(joint_faces.hold_at_joints(cut, self.carried), self.seen), source)
+        return Cut(joint_strays.draw_in_strays(cut, self.seen), source)

@@ -10,24 +10,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gsac.avatar.binding import Bound, FaceFrames, bind, unbind
-from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.binding import FaceFrames, bind, unbind
+from gsac.avatar.gaussians import FIELDS, Gaussians
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.gaussians.bends import Placed
-from gsac.stages.train.gaussians.joint_faces import BentFaces, bind_anew, face_weights, faces_around
+from gsac.stages.train.gaussians.joint_faces import BentFaces, bind_anew, face_weights, faces_around, hold_at_joints
 from gsac.stages.train.gaussians.joint_strays import Bent, BentSilhouettes
 
 EXTENT = 2.0
 """Standard deviations from the middle of a gaussian to its ends."""
-OFF = 0.016
+OFF = 0.02
 """m farther off the body than in the usual pose that an end of one of `FULL_SIZE` gaussians may be in a bend; fewer are wider."""
 OUTWARD = 0.5
 """Cosine between the body's normal and the way to an end from which on it is outside."""
 SHORTEST, FAINT = 0.006, 0.05
 """m, longest axis, and opacity of gaussians that stay whole."""
 ROUNDS = 2
-MOST = 0.05
+MOST = 0.03
 """Gaussians at most that are cut, of all: those whose ends rise most."""
 APART, LENGTH, WIDTH = 0.55, 0.6, 0.967
 """Of the whole's standard deviation: from its middle to those of the halves, and a half's along the cut axis and across."""
@@ -51,14 +51,19 @@ def cut_at_joints(gaussians: Gaussians, carried: BentFaces, seen: BentSilhouette
     """The gaussians, those in halves that stand off most where joints bend. carried, seen: the body in the same bends."""
     out, source, room = gaussians, np.arange(len(gaussians)), int(MOST * len(gaussians))
     off = OFF * max(1.0, FULL_SIZE / max(len(gaussians), 1)) ** 0.5
+    looked_at = source
     for _ in range(ROUNDS):
-        length = np.exp(out.log_scale).max(1) * seen.usual.frames.k[out.face]
-        rise = np.where((length > SHORTEST) & (out.opacity > FAINT), find_rise(out, seen, off), 0)
-        worst = np.argsort(-rise, kind="stable")[:room]
-        worst = np.sort(worst[rise[worst] > off])
+        size = np.exp(out.log_scale[looked_at]).max(1) * seen.usual.frames.k[out.face[looked_at]]
+        looked_at = looked_at[(size > SHORTEST) & (out.opacity[looked_at] > FAINT)]
+        rise = find_rise(out[looked_at], seen, off)
+        worst = looked_at[np.argsort(-rise, kind="stable")[:min(room, np.count_nonzero(rise > off))]]
         if not len(worst):
             break
-        out, source, room = halve(out, worst, carried), np.append(source, source[worst]), room - len(worst)
+        looked_at = np.append(worst, np.arange(len(out), len(out) + len(worst)))
+        halves = halve(out[worst], carried)
+        out, source, room = out[np.append(np.arange(len(out)), worst)], np.append(source, source[worst]), room - len(worst)
+        for name in FIELDS:
+            getattr(out, name)[looked_at] = getattr(halves, name)
     return Cut(out, source)
 
 
@@ -95,27 +100,23 @@ def find_height(places: np.ndarray, surface: Placed) -> np.ndarray:
     return np.where(over > OUTWARD * away, away, 0)
 
 
-def halve(gaussians: Gaussians, which: np.ndarray, carried: BentFaces) -> Gaussians:
-    """The gaussians, `which` (n,) cut across the longest axis: one half each in its place, the others at the end."""
-    at = carried.usual.frames
-    out = gaussians[np.append(np.arange(len(gaussians)), which)]
-    bound = bind(at, out.face, out.mu, out.quat, out.log_scale)
-    halves = np.append(which, np.arange(len(gaussians), len(out)))
-    side = np.repeat([-1.0, 1.0], len(which))
-    longest, thinnest = bound.scales[halves].argmax(1), bound.scales[halves].argmin(1)
-    length, thin = bound.scales[halves, longest], bound.scales[halves, thinnest]
-    bound.means[halves] += (side * APART * length)[:, None] * bound.rotations[halves, :, longest]
-    bound.scales[halves] *= WIDTH
-    bound.scales[halves, thinnest], bound.scales[halves, longest] = thin, LENGTH * length
-    out.mu[halves], out.quat[halves], out.log_scale[halves] = unbind(at, out.face[halves], Bound(*(part[halves] for part in bound)))
-    out.opacity[halves] = out.opacity[halves] * (THINNED[0] + THINNED[1] * out.opacity[halves])
-    face = out.face.copy()
-    face[halves] = find_carrier(out.face[halves], bound.means[halves], carried)
-    return bind_anew(out, face, bound, at)
+def halve(gaussians: Gaussians, carried: BentFaces) -> Gaussians:
+    """One half of each of N gaussians, cut across its longest axis, then the N others; each on the face that carries it best."""
+    at, count = carried.usual.frames, len(gaussians)
+    halves = gaussians[np.tile(np.arange(count), 2)]
+    bound = bind(at, halves.face, halves.mu, halves.quat, halves.log_scale)
+    each, longest, thinnest = np.arange(2 * count), bound.scales.argmax(1), bound.scales.argmin(1)
+    length, thin = bound.scales[each, longest], bound.scales[each, thinnest]
+    bound.means[:] += (np.repeat([-APART, APART], count) * length)[:, None] * bound.rotations[each, :, longest]
+    bound.scales[:] *= WIDTH
+    bound.scales[each, thinnest], bound.scales[each, longest] = thin, LENGTH * length
+    halves.mu, halves.quat, halves.log_scale = unbind(at, halves.face, bound)
+    halves.opacity *= THINNED[0] + THINNED[1] * halves.opacity
+    return hold_at_joints(bind_anew(halves, find_nearest_face(halves.face, bound.means, carried), bound, at), carried)
 
 
-def find_carrier(face: np.ndarray, places: np.ndarray, carried: BentFaces) -> np.ndarray:
-    """(n,) faces nearest to places (n, 3) m in the usual pose, of the part and the side of face (n,)."""
+def find_nearest_face(face: np.ndarray, places: np.ndarray, carried: BentFaces) -> np.ndarray:
+    """(N,) faces nearest to places (N, 3) m in the usual pose, of the part and the side of face (N,)."""
     at, body = carried.usual.frames, carried.body
     near, fits = faces_around(Workspace().share, face, places, at, face_weights(body), carried.rest[body.faces])
     away = np.linalg.norm(at.T[near] - places[:, None], axis=2)
