@@ -76,7 +76,7 @@ class TrainConfig:
     """Where the steps run: cpu, cuda, or auto: cuda where a GPU can be used."""
     gaussians: int | str = AUTO
     """How many; auto: the smallest size whose held-out frames score as well as with as many as the person's pixels ask for: 14,000
-    for a person of 1,000 px, 18,000 on a GPU. Recipe fast adds up to 3 %, halves of those that a bent joint would lift off
+    for a person of 1,000 px, 18,000 on a GPU. Recipe fast adds up to 2 %, halves of those that a bent joint would lift off
     the body. Recipe paper has one a face."""
     every_size: bool = False
     """Whether auto tries all its sizes instead of stopping at the first that scores worse: for `gsac bench size`."""

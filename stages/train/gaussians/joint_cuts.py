@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gsac.avatar.binding import FaceFrames, bind, unbind
+from gsac.avatar.body import Body
 from gsac.avatar.gaussians import FIELDS, Gaussians
+from gsac.avatar.joints import INDEX
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.gaussians.bends import Placed
@@ -20,14 +22,18 @@ from gsac.stages.train.gaussians.joint_strays import Bent, BentSilhouettes
 
 EXTENT = 2.0
 """Standard deviations from the middle of a gaussian to its ends."""
-OFF = 0.02
-"""m farther off the body than in the usual pose that an end of one of `FULL_SIZE` gaussians may be in a bend; fewer are wider."""
+OFF, OFF_LIMB = 0.02, 0.011
+"""m farther off the body than in the usual pose that an end of one of `FULL_SIZE` gaussians may be in a bend, on the trunk and on
+forearms and lower legs, which are thin and seen before what is behind them; fewer are wider."""
+LIMB = [INDEX[f"{side}_{name}"] for side in ("left", "right") for name in ("elbow", "wrist", "knee", "ankle")]
+ON_LIMB = 0.25
+"""Joints that move these, and the least skin weight of a face on them."""
 OUTWARD = 0.5
 """Cosine between the body's normal and the way to an end from which on it is outside."""
 SHORTEST, FAINT = 0.006, 0.05
 """m, longest axis, and opacity of gaussians that stay whole."""
 ROUNDS = 2
-MOST = 0.03
+MOST = 0.02
 """Gaussians at most that are cut, of all: those whose ends rise most."""
 APART, LENGTH, WIDTH = 0.55, 0.6, 0.967
 """Of the whole's standard deviation: from its middle to those of the halves, and a half's along the cut axis and across."""
@@ -50,13 +56,13 @@ def uncut(most: int) -> int:
 def cut_at_joints(gaussians: Gaussians, carried: BentFaces, seen: BentSilhouettes) -> Cut:
     """The gaussians, those in halves that stand off most where joints bend. carried, seen: the body in the same bends."""
     out, source, room = gaussians, np.arange(len(gaussians)), int(MOST * len(gaussians))
-    off = OFF * max(1.0, FULL_SIZE / max(len(gaussians), 1)) ** 0.5
+    allowed = find_allowed(carried.body) * max(1.0, FULL_SIZE / max(len(gaussians), 1)) ** 0.5
     looked_at = source
     for _ in range(ROUNDS):
         size = np.exp(out.log_scale[looked_at]).max(1) * seen.usual.frames.k[out.face[looked_at]]
         looked_at = looked_at[(size > SHORTEST) & (out.opacity[looked_at] > FAINT)]
-        rise = find_rise(out[looked_at], seen, off)
-        worst = looked_at[np.argsort(-rise, kind="stable")[:min(room, np.count_nonzero(rise > off))]]
+        excess = find_rise(out[looked_at], seen, allowed.min()) / allowed[out.face[looked_at]]
+        worst = looked_at[np.argsort(-excess, kind="stable")[:min(room, np.count_nonzero(excess > 1))]]
         if not len(worst):
             break
         looked_at = np.append(worst, np.arange(len(out), len(out) + len(worst)))
@@ -65,6 +71,11 @@ def cut_at_joints(gaussians: Gaussians, carried: BentFaces, seen: BentSilhouette
         for name in FIELDS:
             getattr(out, name)[looked_at] = getattr(halves, name)
     return Cut(out, source)
+
+
+def find_allowed(body: Body) -> np.ndarray:
+    """(F,) m, `OFF` or `OFF_LIMB` by what each face is on."""
+    return np.where(face_weights(body)[:, LIMB].sum(1) > ON_LIMB, OFF_LIMB, OFF)
 
 
 def find_rise(gaussians: Gaussians, seen: BentSilhouettes, least: float) -> np.ndarray:

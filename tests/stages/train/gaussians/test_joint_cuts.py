@@ -10,7 +10,7 @@ from gsac.avatar.joints import INDEX, turn_joints
 from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.gaussians import joint_cuts
-from gsac.stages.train.gaussians.joint_faces import bend_faces
+from gsac.stages.train.gaussians.joint_faces import bend_faces, face_weights
 from gsac.stages.train.gaussians.joint_strays import bend_silhouettes
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.poses.turned_body import turn_before_camera
@@ -58,13 +58,26 @@ def along_the_arm(poses, gaussians):
     return made, which
 
 
+def excess_of(gaussians, bent):
+    """(N,) by how many times what is allowed an end of each gaussian rises."""
+    allowed = joint_cuts.find_allowed(bent[0].body)
+    return joint_cuts.find_rise(gaussians, bent[1], allowed.min()) / allowed[gaussians.face]
+
+
+def test_forearms_and_lower_legs_are_held_closer_than_the_trunk(bent):
+    weights, allowed = face_weights(bent[0].body), joint_cuts.find_allowed(bent[0].body)
+    for joint, there in (("right_elbow", joint_cuts.OFF_LIMB), ("left_knee", joint_cuts.OFF_LIMB), ("spine2", joint_cuts.OFF),
+                         ("head", joint_cuts.OFF)):
+        assert (allowed[weights[:, INDEX[joint]] > 0.9] == there).all()
+
+
 def test_what_reaches_past_the_elbow_is_cut_until_it_bends_with_the_arm(poses, plain, bent):
     made, which = along_the_arm(poses, plain)
-    before = joint_cuts.find_rise(made, bent[1], joint_cuts.OFF)[which]
-    assert np.count_nonzero(before > 1.5 * joint_cuts.OFF) > 10
+    before = excess_of(made, bent)[which]
+    assert np.count_nonzero(before > 2) > 10
     cut, source = joint_cuts.cut_at_joints(made, *bent)
-    after = joint_cuts.find_rise(cut, bent[1], joint_cuts.OFF)[np.isin(source, which)]
-    assert np.count_nonzero(after > 1.5 * joint_cuts.OFF) < 0.2 * np.count_nonzero(before > 1.5 * joint_cuts.OFF)
+    after = excess_of(cut, bent)[np.isin(source, which)]
+    assert np.count_nonzero(after > 2) < 0.2 * np.count_nonzero(before > 2)
     assert after.max() < 0.8 * before.max()
 
 
@@ -73,8 +86,7 @@ def test_nothing_but_what_a_bend_lifts_is_touched(poses, plain, bent):
     cut, source = joint_cuts.cut_at_joints(made, *bent)
     halves = np.bincount(source)
     whole = np.flatnonzero(halves == 1)
-    lifted = joint_cuts.find_rise(made, bent[1], joint_cuts.OFF) > joint_cuts.OFF
-    assert len(plain) < len(cut) and lifted[halves > 1].all()
+    assert len(plain) < len(cut) and (excess_of(made, bent)[halves > 1] > 1).all()
     np.testing.assert_array_equal(source[:len(made)], np.arange(len(made)))
     for name in ("face", "mu", "quat", "log_scale", "rgb", "opacity"):
         np.testing.assert_array_equal(getattr(cut, name)[whole], getattr(made, name)[whole])
@@ -107,13 +119,12 @@ def test_two_halves_look_as_the_whole_did(poses, plain, bent, opacity):
 def test_of_many_the_worst_are_cut_and_no_more_than_there_is_room_for(plain, bent):
     long = plain[np.arange(len(plain))]
     long.log_scale[:, 0] += np.log(4).astype(np.float32)
-    rise = joint_cuts.find_rise(long, bent[1], joint_cuts.OFF)
-    room = int(joint_cuts.MOST * len(long))
-    assert np.count_nonzero(rise > joint_cuts.OFF) > 1.5 * room
+    excess, room = excess_of(long, bent), int(joint_cuts.MOST * len(long))
+    assert np.count_nonzero(excess > 1) > 1.5 * room
     cut, source = joint_cuts.cut_at_joints(long, *bent)
     assert len(cut) == len(long) + room
     taken = np.bincount(source) > 1
-    assert rise[taken].min() >= np.sort(rise)[-room]
+    assert excess[taken].min() >= np.sort(excess)[-room]
 
 
 def test_what_is_left_uncut_has_room_for_its_halves():
