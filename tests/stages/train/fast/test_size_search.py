@@ -13,7 +13,13 @@ from gsac.stages.train import STAGE, choose_heldout
 from gsac.stages.train.fast import refit, size_search, trainer
 from gsac.stages.train.fast.cpu import Cpu
 from gsac.stages.train.fast.size_rule import SizeScore, choose, optimism, standard_error
+from gsac.stages.train.gaussians import joint_cuts
 from gsac.stages.train.stage import run
+
+
+def is_handed_out(count, size):
+    """Whether an avatar of so many gaussians is what becomes of `size`: less a speck, and with halves where joints bend."""
+    return size - 1 <= count <= (1 + joint_cuts.MOST) * size
 
 
 def score(count, psnr, detail=0.9, spread=0.1):
@@ -99,7 +105,8 @@ def test_auto_walks_down_until_the_held_out_frames_tell_a_difference(job_anywher
     curve = figures["size_curve"]
     assert [row["n_gaussians"] for row in curve] in ([1200, 600], [1200, 600, 60]), "60 gaussians are not enough for a person"
     chosen = [row["n_gaussians"] for row in curve if row["chosen"]]
-    assert len(chosen) == 1 and len(Gaussians.read(made.out / "avatar.npz")) == pytest.approx(chosen[0], abs=1)
+    assert len(chosen) == 1
+    assert is_handed_out(len(Gaussians.read(made.out / "avatar.npz")), chosen[0])
     assert curve[-1]["n_gaussians"] != chosen[0] and curve[-1]["psnr_fg_mean"] < curve[-2]["psnr_fg_mean"]
     assert curve[1]["psnr_fg_mean"] > curve[0]["psnr_fg_mean"] - 2, "what is left after merging covers the person"
     assert figures["size_frames"] == figures["heldout_frames"], "a short clip needs its frames for training"
@@ -140,7 +147,7 @@ def test_every_size_is_tried_where_that_is_asked_for_and_the_choice_is_the_rules
     assert [row["n_gaussians"] for row in curve] == [400, 40, 20]
     scores = [SizeScore(row["n_gaussians"], row["psnr_fg"], row["detail"]) for row in curve]
     assert [row["n_gaussians"] for row in curve if row["chosen"]] == [choose(scores).n_gaussians]
-    assert len(Gaussians.read(made.out / "avatar.npz")) == pytest.approx(choose(scores).n_gaussians, abs=1)
+    assert is_handed_out(len(Gaussians.read(made.out / "avatar.npz")), choose(scores).n_gaussians)
 
 
 @pytest.mark.slow
@@ -148,4 +155,4 @@ def test_auto_without_held_out_frames_takes_the_largest_size(job_anywhere, monke
     monkeypatch.setattr(size_search, "list_sizes", lambda largest: (700, 300))
     made = job_anywhere(gaussians="auto", frames=3, steps=5)
     run(made)
-    assert json.loads((made.out / "metrics.json").read_text())["n_gaussians"] == 700
+    assert is_handed_out(json.loads((made.out / "metrics.json").read_text())["n_gaussians"], 700)
