@@ -4,28 +4,22 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import Bound, bind, face_frames, unbind
-from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.joints import INDEX, turn_joints
+from gsac.avatar.joints import INDEX
 from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.gaussians import joint_cuts
 from gsac.stages.train.gaussians.joint_faces import bend_faces, face_weights
 from gsac.stages.train.gaussians.joint_strays import bend_silhouettes
-from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.poses.turned_body import turn_before_camera
+from support.hanging_arms import FRAMES, joint_at, pose_hanging_arms
 
-FRAMES = np.arange(1)
 LONG = 0.03
 
 
 @pytest.fixture(scope="module")
 def poses():
-    """A frame with hanging arms."""
-    body = Body.load()
-    pose = turn_joints(np.zeros((55, 3)), {"shoulder": (0, 0, -60)})[None]
-    return Poses(body, BodyParams.from_pose(pose, np.zeros((1, 3)), np.zeros(4), np.zeros((1, body.exprdirs.shape[2])), 300.0,
-                                            (64.0, 64.0)))
+    return pose_hanging_arms()
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +37,7 @@ def along_the_arm(poses, gaussians):
     """The gaussians, those of the left forearm below the elbow LONG m along the arm; and which these are."""
     at = face_frames(poses.vertices(0), poses.body.faces)
     bound = bind(at, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    elbow, wrist = (poses.transforms(0)[INDEX[f"left_{name}"]] @ np.append(poses.rest(0)[1][INDEX[f"left_{name}"]], 1)
-                    for name in ("elbow", "wrist"))
+    elbow, wrist = (joint_at(poses, f"left_{name}") for name in ("elbow", "wrist"))
     arm = (wrist - elbow) / np.linalg.norm(wrist - elbow)
     which = np.flatnonzero(np.linalg.norm(bound.means - elbow - 0.03 * arm, axis=1) < 0.05)
     normal = at.R[gaussians.face[which], :, 1]

@@ -4,35 +4,23 @@ import numpy as np
 import pytest
 
 from gsac.avatar.binding import bind, face_frames
-from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.joints import INDEX, turn_joints
+from gsac.avatar.joints import turn_joints
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.gaussians import joint_strays
 from gsac.stages.train.gaussians.bends import BENDS, put_in_pose
 from gsac.stages.train.gaussians.joint_faces import bind_anew
-from gsac.stages.train.poses.poses import Poses
-
-FRAMES = np.arange(1)
+from support.hanging_arms import FRAMES, joint_at, pose_hanging_arms
 
 
 @pytest.fixture(scope="module")
 def poses():
-    """A frame with hanging arms."""
-    body = Body.load()
-    pose = turn_joints(np.zeros((55, 3)), {"shoulder": (0, 0, -60)})[None]
-    return Poses(body, BodyParams.from_pose(pose, np.zeros((1, 3)), np.zeros(4), np.zeros((1, body.exprdirs.shape[2])), 300.0,
-                                            (64.0, 64.0)))
+    return pose_hanging_arms()
 
 
 @pytest.fixture(scope="module")
 def plain(poses):
     return Gaussians.area(poses.rest(0)[0], poses.body.faces, 6000)
-
-
-def joint_at(poses, name):
-    """(3,) m in the frame."""
-    return poses.transforms(0)[INDEX[name]] @ np.append(poses.rest(0)[1][INDEX[name]], 1)
 
 
 def carried_by_the_forearm(poses, gaussians):
