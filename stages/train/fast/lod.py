@@ -22,9 +22,9 @@ from gsac.stages.train.fast.initial_gaussians import crop_views
 from gsac.stages.train.fast.refit import FIRM, GENTLE
 from gsac.stages.train.fast.size_search import POSE_ROUNDS, count_pixels, viewing_weight
 from gsac.stages.train.fast.trainer import Trainer
+from gsac.stages.train.gaussians.heights import level_heights
 from gsac.stages.train.gaussians.joint_cuts import uncut
 from gsac.stages.train.gaussians.merge import merge_to_size
-from gsac.stages.train.gaussians.unseen import level_heights
 from gsac.stages.train.judge.heldout import Candidate, judge_all
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained

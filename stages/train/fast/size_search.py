@@ -25,8 +25,8 @@ from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.fast.size_rule import MOST_LOST, SizeScore, choose, optimism
 from gsac.stages.train.fast.trainer import Trainer
 from gsac.stages.train.gaussians.added_alpha import added_alpha
+from gsac.stages.train.gaussians.heights import level_heights
 from gsac.stages.train.gaussians.merge import merge_to_size, skin_weights
-from gsac.stages.train.gaussians.unseen import level_heights
 from gsac.stages.train.judge.heldout import Candidate, judge_person
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained

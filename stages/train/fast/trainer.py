@@ -38,9 +38,11 @@ from gsac.stages.train.finite import named_gradients, named_pose, require_finite
 from gsac.stages.train.gaussians.barely_seen import hold_barely_seen
 from gsac.stages.train.gaussians.cloth_offsets import Offsets, fold
 from gsac.stages.train.gaussians.first_colours import fill_unseen
+from gsac.stages.train.gaussians.heights import level_heights
 from gsac.stages.train.gaussians.joint_limits import TIE, limit_nowhere, limit_where_grown
 from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on_background, through_background
-from gsac.stages.train.gaussians.unseen import find_seen, flatten_unseen, front_pixels, level_heights
+from gsac.stages.train.gaussians.shown import find_seen, front_pixels
+from gsac.stages.train.gaussians.unseen import colour_unseen, flatten_unseen
 from gsac.stages.train.poses.guessed_limbs import find_guessed_faces
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
@@ -230,16 +232,13 @@ class Trainer:
 
         views: frame -> view at half the size.
         """
-        gaussians = self.freeze_unseen(views)
-        gaussians = level_heights(flatten_unseen(gaussians, self.seen, self.rest, self.faces), self.rest, self.faces)
+        gaussians, pixels = self.gaussians(), self._front_pixels(views)
+        self.seen = find_seen(pixels, gaussians, self.rest, self.faces)
+        laid = flatten_unseen(gaussians, self.seen, self.rest, self.faces)
+        laid.rgb = colour_unseen(gaussians, pixels, self.seen, self.rest, self.poses.body)
+        gaussians = level_heights(laid, self.rest, self.faces)
         self.values = learned_values(gaussians)
         self.start = gaussians.mu.copy()
-
-    def freeze_unseen(self, views: dict[int, View]) -> Gaussians:
-        """Freezes the gaussians that no frame shows; returns all gaussians. views: frame -> view at half the size."""
-        gaussians = self.gaussians()
-        self.seen = find_seen(self._front_pixels(views), gaussians, self.rest, self.faces)
-        return gaussians
 
     def finish(self, views: dict[int, View]) -> tuple[Gaussians, np.ndarray]:
         """The gaussians with their heights levelled, and seen (N,) bool; the less is seen of one, the more its neighbours' colour.

@@ -12,13 +12,14 @@ from scipy.sparse import coo_matrix
 
 from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
+from gsac.stages.train.gaussians.around_limbs import hold_colours
 from gsac.stages.train.gaussians.disc_area import divisible_areas
 from gsac.stages.train.gaussians.nearest import find_nearest
-from gsac.stages.train.gaussians.unseen import AROUND, NEIGHBOURS, hold_colours
+from gsac.stages.train.gaussians.shown import AROUND, find_evidence, find_place
 from gsac.stages.train.poses.bundle_adjust import conjugate_gradients
 
-FACING = 0.3
-"""Cosine between the normals of two gaussians above which one tells how well the frames show the other's place."""
+NEIGHBOURS = 9
+"""Gaussians whose colours are held alike, itself the first."""
 FAINT = 0.1
 """Evidence at which a gaussian is half in doubt."""
 PULL = 0.02
@@ -43,14 +44,12 @@ def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray,
         return gaussians.rgb
     frames = face_frames(rest, faces)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    normals = frames.R[gaussians.face, :, 1]
-    near = find_nearest(bound.means, bound.means, AROUND)
-    alike = np.einsum("nki,ni->nk", normals[near], normals)
+    near, alike = find_place(bound.means, frames.R[gaussians.face, :, 1])
     areas = divisible_areas(bound)
     evidence = find_evidence(pixels, areas, seen, near, alike)
     out = gaussians[np.arange(len(gaussians))]
     own = np.where(seen, pixels / max(float(np.median(pixels[seen])), 1e-12), 1)  # the unseen were laid in colours of their cloth
-    out.rgb = spread_colours(gaussians.rgb, own, evidence, near[:, :NEIGHBOURS + 1], alike[:, :NEIGHBOURS + 1])
+    out.rgb = spread_colours(gaussians.rgb, own, evidence, near[:, :NEIGHBOURS], alike[:, :NEIGHBOURS])
     shown = pixels / areas
     sure = np.flatnonzero(seen & (evidence >= SURE) & (shown >= SURE * np.median(shown[seen])))
     poor = np.flatnonzero(evidence < SURE)
@@ -60,17 +59,6 @@ def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray,
         share = np.clip((SURE - evidence[poor]) / (SURE - HELD), 0, 1)[:, None]
         out.rgb[poor] = np.where(share < 1, out.rgb[poor] + share * (held - out.rgb[poor]), held)
     return out.rgb
-
-
-def find_evidence(pixels: np.ndarray, areas: np.ndarray, seen: np.ndarray, near: np.ndarray, alike: np.ndarray) -> np.ndarray:
-    """(N,) how well the frames show each gaussian's place: pixels per area there, over the median of the seen.
-
-    pixels: (N,) `front_pixels`; areas: (N,) m2; seen: (N,) bool; near: (N, K) gaussians at the place; alike: (N, K) cosine
-    between their normals and its own.
-    """
-    facing = alike > FACING
-    shown = (pixels[near] * facing).sum(1) / np.maximum((areas[near] * facing).sum(1), 1e-12)
-    return shown / max(float(np.median(shown[seen])), 1e-12)
 
 
 def spread_colours(rgb: np.ndarray, own: np.ndarray, evidence: np.ndarray, near: np.ndarray, alike: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from gsac.avatar.zbuffer import rasterise
 from gsac.stages.train.config import FULL_SIZE
 from gsac.stages.train.gaussians.added_alpha import added_alpha
 from gsac.stages.train.gaussians.bends import BENDS, Placed, place, put_in_pose, usual_pose
-from gsac.stages.train.gaussians.unseen import find_heights
+from gsac.stages.train.gaussians.heights import find_heights
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.poses.turned_body import turn_before_camera
 

@@ -12,7 +12,7 @@ MANY = 10000
 
 
 def find_nearest(places: np.ndarray, queries: np.ndarray, count: int) -> np.ndarray:
-    """(M, K) indices of the places (N, 3) nearest to each of queries (M, 3), nearest first; K is `count`, at most N."""
+    """(M, K) indices of the places (N, D) nearest to each of queries (M, D), nearest first; K is `count`, at most N."""
     most = min(count, len(places))
     threads = kernel_threads() if len(queries) >= MANY else 1
     return KDTree(places).query(queries, k=most, workers=threads)[1].reshape(len(queries), most)

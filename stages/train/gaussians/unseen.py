@@ -1,112 +1,83 @@
-"""Gaussians that no frame shows from their front: finds them, and lays them on their neighbours' surface in their colour.
+"""Gaussians that no frame shows from their front are laid flat on their neighbours' surface, in colours of what is seen around.
 
-The images do not constrain them, and training would leave them as fur at edges and ragged soles. Nor do images from one side
-constrain depth: no gaussian may stand off the surface that those around it make.
+The images do not constrain them, and training would leave them as fur at edges and ragged soles.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.binding import FaceFrames, bind, face_frames
-from gsac.avatar.camera import Camera
+from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.body import Body
 from gsac.avatar.gaussians import FLATNESS, Gaussians
-from gsac.avatar.light import shade
-from gsac.avatar.raster import render_bound
-from gsac.avatar.threads import Workspace
-from gsac.stages.train.gaussians.added_alpha import added_alpha
+from gsac.stages.train.gaussians.around_limbs import hold_colours, mix_colours, stretch
 from gsac.stages.train.gaussians.disc_area import divisible_areas
 from gsac.stages.train.gaussians.nearest import find_nearest
+from gsac.stages.train.gaussians.shown import find_evidence, find_place
 
-BEHIND, FRONT = -0.2, 0.3
-"""Cosine between a face's normal and the direction to the camera: up to the first a frame shows nothing of it, from the second on
-all. The first is below zero, since gaussians just behind a limb's edge make its outline."""
-LEAST_SHOWN = 0.05
-"""Least pixels of a half-size frame, mean over the frames, that a seen gaussian shows of its front."""
-LEAST_SHARE = 0.15
-"""Least pixels per area of a seen gaussian, as a share of the median: armpits are shown little, and at a slant."""
 NEIGHBOURS = 8
-"""Seen gaussians that an unseen one takes after."""
-AROUND, STEP = 24, 0.02
-"""Gaussians whose median height is the surface at a place, and m that one may lie above or below it."""
-SPARSE = 3000
-"""Gaussians of an avatar below which STEP grows with their spacing: shrunk, they would leave holes."""
-
-
-def front_pixels(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, camera: Camera,
-                 workspace: Workspace) -> np.ndarray:
-    """(N,) pixels that each gaussian adds to one image from its front. vertices: (V, 3) m, camera frame; faces: (F, 3)."""
-    added = added_alpha(render_bound(vertices, faces, gaussians, camera, workspace))
-    frames = face_frames(vertices, faces)
-    normal, place = frames.R[gaussians.face, :, 1], frames.T[gaussians.face]
-    facing = -(normal * place).sum(1) / np.maximum(np.linalg.norm(place, axis=1), 1e-9)
-    return np.clip((facing - BEHIND) / (FRONT - BEHIND), 0, 1) * added
-
-
-def find_seen(pixels: np.ndarray, gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(N,) bool, whether gaussians are seen. pixels: (N,) `front_pixels`, mean over the frames; rest: (V, 3) m; faces: (F, 3)."""
-    bound = bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    share = pixels / divisible_areas(bound)
-    seen = pixels > LEAST_SHOWN
-    return seen & (share > LEAST_SHARE * np.median(share[seen])) if seen.any() else seen
+"""Seen gaussians that an unseen one takes its height after, and its colour where they lie beside it."""
+RING, COVER = 6, 0.45
+"""Gaussians about one, and the share of the way to the last of them at which discs leave no gap."""
+BESIDE, FAR = 0.01, 0.03
+"""m to the nearest seen gaussian, up to which colours go on as they are there, and from which on they are those around the limb."""
+APART = 5
+"""Standard deviations of an unseen gaussian that the nearest seen one lies away, at least, where it is widened."""
 
 
 def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians, unseen ones as flat discs in the colour of their neighbours. seen: (N,) bool; rest: (V, 3) m; faces: (F, 3).
+    """The gaussians, unseen ones as flat discs that cover the body, no higher over it than their neighbours.
 
-    They lie no higher over the body than their neighbours and are no larger. Opacity stays: it is learned from the masks.
+    Opacity stays: it is learned from the masks. seen: (N,) bool; rest: (V, 3) m; faces: (F, 3).
     """
-    poor = np.flatnonzero(~seen)
-    if not len(poor) or not seen.any():
+    poor, known = np.flatnonzero(~seen), np.flatnonzero(seen)
+    if not len(poor) or not len(known):
         return gaussians
     frames = face_frames(rest, faces)
     size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
-    near = np.flatnonzero(seen)[find_nearest(middle[seen], middle[poor], NEIGHBOURS)]
+    near = known[find_nearest(middle[known], middle[poor], NEIGHBOURS)]
     out = gaussians[np.arange(len(gaussians))]
     height = np.median(size[near] * gaussians.mu[near, 1], axis=1) / size[poor]
     out.mu[poor, 1] = np.minimum(gaussians.mu[poor, 1], height)
+    means = bind(frames, out.face, out.mu, out.quat, out.log_scale).means
     widths = np.sort(gaussians.log_scale, 1)[:, 1:].mean(1) + np.log(size)
-    width = np.minimum(np.median(widths[near], axis=1), widths[poor]) - np.log(size[poor])
+    width = np.minimum(np.median(widths[near], axis=1), widths[poor])
+    width = np.maximum(width, np.log(covering_widths(means, poor, known))) - np.log(size[poor])
     out.log_scale[poor] = np.stack([width, width + np.log(FLATNESS), width], 1)
     out.quat[poor] = [1, 0, 0, 0]
-    out.rgb[poor] = gaussians.rgb[near].mean(1)
-    out.rgb[poor] = hold_colours(out, poor, near, frames.R[:, :, 1])
     return out
 
 
-def hold_colours(gaussians: Gaussians, poor: np.ndarray, near: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(M, 3) colours of M gaussians, held within those of gaussians around them, and in the clip's light within these so lit.
+def covering_widths(means: np.ndarray, poor: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(M,) m, standard deviations at which gaussians leave no gap between them, less near seen ones: an outline stays as it is.
 
-    poor: (M,) the gaussians; near: (M, K) well seen ones around each; normals: (F, 3) of the faces at rest. The light was told
-    apart from the colours on the normals that frames showed; on others it is a guess that can leave all that was seen. Where a
-    colour cannot be within both, it is so in the light.
+    means: (N, 3) m at rest; poor: (M,) the unseen; known: (K,) the seen.
     """
-    held = np.clip(gaussians.rgb[poor], gaussians.rgb[near].min(1), gaussians.rgb[near].max(1))
-    if gaussians.light is None:
-        return held
-    factor = shade(gaussians.light, normals[gaussians.face])
-    lit = gaussians.rgb * factor
-    return np.clip(np.clip(held * factor[poor], lit[near].min(1), lit[near].max(1)) / factor[poor], 0, 1).astype(np.float32)
+    spacing = np.linalg.norm(means[find_nearest(means, means[poor], RING + 1)[:, -1]] - means[poor], axis=1)
+    away = np.linalg.norm(means[known[find_nearest(means[known], means[poor], 1)[:, 0]]] - means[poor], axis=1)
+    return np.maximum(np.minimum(COVER * spacing, away / APART), 1e-9)
 
 
-def level_heights(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians, moved to within STEP (`SPARSE`: more) of the median height around them. rest: (V, 3) m; faces: (F, 3).
+def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, rest: np.ndarray, body: Body) -> np.ndarray:
+    """(N, 3) colours, those of unseen gaussians as what is seen beside them, farther off mixed of what is seen around the limb.
 
-    One whose standard deviation along the face's normal is larger than that shrinks to it.
+    pixels: (N,) `front_pixels`, mean over the frames; seen: (N,) bool; rest: (V, 3) m.
     """
-    step = STEP * max(1, SPARSE / max(len(gaussians), 1)) ** 0.5
-    frames = face_frames(rest, faces)
-    size = np.maximum(frames.k[gaussians.face], 1e-9)
-    height, usual = find_heights(gaussians, frames)
+    poor, known = np.flatnonzero(~seen), np.flatnonzero(seen)
+    if not len(poor) or not len(known):
+        return gaussians.rgb
+    frames = face_frames(rest, body.faces)
+    normals = frames.R[:, :, 1]
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    axes = np.einsum("ni,nij->nj", frames.R[gaussians.face, :, 1], bound.rotations) * bound.scales
+    areas, places = divisible_areas(bound), stretch(bound, gaussians.face, frames, body)
+    evidence = find_evidence(pixels, areas, seen, *find_place(bound.means, normals[gaussians.face]))
+    shown = pixels / areas
+    trust = np.minimum(shown / max(float(np.median(shown[known])), 1e-12), 1) * np.minimum(evidence, 1)
     out = gaussians[np.arange(len(gaussians))]
-    out.mu[:, 1] = np.clip(height, usual - step, usual + step) / size
-    out.log_scale += np.minimum(0, np.log(step / np.maximum(np.linalg.norm(axes, axis=1), 1e-9)))[:, None].astype(np.float32)
-    return out
-
-
-def find_heights(gaussians: Gaussians, frames: FaceFrames) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) m over the face that carries each gaussian, and (N,) the median of `AROUND` gaussians there. frames: of all faces."""
-    middle, height = frames.T[gaussians.face], frames.k[gaussians.face] * gaussians.mu[:, 1]
-    return height, np.median(height[find_nearest(middle, middle, AROUND)], axis=1)
+    mixed, around = mix_colours(gaussians.rgb[known], trust[known], places[known], places[poor])
+    beside = known[find_nearest(bound.means[known], bound.means[poor], NEIGHBOURS)]
+    away = np.linalg.norm(bound.means[beside[:, 0]] - bound.means[poor], axis=1)
+    share = np.clip((away - BESIDE) / (FAR - BESIDE), 0, 1)[:, None]
+    out.rgb[poor] = share * mixed + (1 - share) * gaussians.rgb[beside].mean(1)
+    out.rgb[poor] = hold_colours(out, poor, known[around], normals)
+    return out.rgb

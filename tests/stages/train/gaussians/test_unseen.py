@@ -1,5 +1,7 @@
 """Gaussians that no frame shows, and what the avatar looks like in poses that no frame has."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,10 +9,10 @@ from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body, BodyParams
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.light import shade
+from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
-from gsac.stages.train.gaussians import unseen
+from gsac.stages.train.gaussians import heights, shown, unseen
 from gsac.stages.train.judge import heldout, novel_poses
 from gsac.stages.train.poses.poses import Poses
 
@@ -35,7 +37,7 @@ def standing(body):
 def test_a_front_view_shows_the_chest_and_neither_back_nor_soles(body):
     gaussians, at = covering(body)
     vertices, camera = standing(body)
-    pixels = unseen.front_pixels(gaussians, vertices, body.faces, camera, Workspace(1))
+    pixels = shown.front_pixels(gaussians, vertices, body.faces, camera, Workspace(1))
     normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
     height = (at[:, 1] - at[:, 1].min()) / np.ptp(at[:, 1])
     trunk, soles = (np.abs(at[:, 0]) < 0.1) & (height > 0.55) & (height < 0.75), (height < 0.01) & (normal[:, 1] < -0.8)
@@ -44,16 +46,13 @@ def test_a_front_view_shows_the_chest_and_neither_back_nor_soles(body):
     assert soles.sum() > 10 and np.quantile(pixels[soles], 0.9) < 0.05
 
 
-def test_unseen_gaussians_lie_flat_no_higher_and_coloured_as_their_neighbours_and_seen_ones_stay(body):
+def test_unseen_gaussians_lie_flat_and_no_higher_than_their_neighbours_and_seen_ones_stay(body):
     gaussians, at = covering(body)
     rng = np.random.default_rng(0)
     seen = at[:, 1] > at[:, 1].min() + 0.05
-    gaussians.rgb[:] = [0.9, 0.1, 0.1]
-    gaussians.rgb[~seen] = rng.random((int((~seen).sum()), 3))
     gaussians.mu[~seen] += rng.normal(0, 2, (int((~seen).sum()), 3)).astype(np.float32)
     gaussians.quat[~seen] = rng.normal(size=(int((~seen).sum()), 4))
     out = unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces)
-    np.testing.assert_allclose(out.rgb[~seen], [[0.9, 0.1, 0.1]] * int((~seen).sum()), atol=1e-5)
     np.testing.assert_array_equal(out.quat[~seen], [[1, 0, 0, 0]] * int((~seen).sum()))
     assert out.mu[~seen, 1].max() < 1e-3, "the neighbours lie on the surface"
     np.testing.assert_array_equal(out.opacity, gaussians.opacity)
@@ -61,24 +60,41 @@ def test_unseen_gaussians_lie_flat_no_higher_and_coloured_as_their_neighbours_an
     np.testing.assert_array_equal(gaussians.quat[~seen, 0] == 1, False)
 
 
-def test_a_figure_seen_on_its_lit_side_alone_shows_no_colour_outside_of_the_seen_ones(body):
-    gaussians, _ = covering(body)
+def from_behind(body):
+    """Vertices before a camera that looks at the back."""
+    vertices, camera = standing(body)
+    return np.float32((vertices - [0, 0, 4.0]) @ np.diag([-1.0, 1.0, -1.0]) + [0, 0, 4.0]), camera
+
+
+def test_unseen_discs_leave_no_gap_and_the_outline_of_what_is_seen_stays(body):
+    gaussians, at = covering(body)
     normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
-    gaussians.light = np.tile([[0.9], [0.4], [0.0], [0.1]], 3).astype(np.float32)
-    gaussians.rgb[:] = np.random.default_rng(0).uniform([0.5, 0.1, 0.2], [0.6, 0.2, 0.3], (len(gaussians), 3))
-    seen = normal[:, 0] > -0.1
+    seen = normal[:, 2] > -0.2
+    gaussians.log_scale[~seen] -= np.log(2)
+    gaussians.opacity[:] = 0.95
     out = unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces)
-    before, after = gaussians.rgb * shade(gaussians.light, normal), out.rgb * shade(out.light, normal)
-    low, high = before[seen].min(0), before[seen].max(0)
-    assert (before[~seen] < 0.8 * low).any(), "the light goes on falling where no frame looked"
-    assert (after[~seen] >= low - 1e-5).all() and (after[~seen] <= high + 1e-5).all()
-    np.testing.assert_array_equal(out.rgb[seen], gaussians.rgb[seen])
+
+    def alpha(which, view):
+        vertices, camera = view(body)
+        return render_bound(vertices, body.faces, which, camera, Workspace(1)).alpha
+
+    far = np.linalg.norm(at[~seen][:, None] - at[seen][None, ::7], axis=2).min(1) > 0.04
+    trunk = np.flatnonzero(~seen)[far & (np.abs(at[~seen, 0]) < 0.1) & (at[~seen, 1] > 0)]
+    back, camera = from_behind(body)
+    x, y = camera.project(face_frames(back, body.faces).T[gaussians.face[trunk]].astype(np.float64)).astype(int).T
+    before, after = (alpha(replace(which, opacity=np.where(seen, 1e-4, which.opacity)), from_behind)[y, x]
+                     for which in (gaussians, out))
+    assert len(trunk) > 50 and np.quantile(before, 0.1) < 0.8 and np.quantile(after, 0.1) > 0.9
+    for view in (standing, from_behind):
+        were, are = alpha(gaussians, view), alpha(out, view)
+        assert are[were < 0.004].sum() < 5e-4 * were.sum()
 
 
 def test_where_nothing_or_everything_is_seen_nothing_changes(body):
     gaussians, _ = covering(body, 300)
     for seen in (np.zeros(300, bool), np.ones(300, bool)):
         assert unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces) is gaussians
+        assert unseen.colour_unseen(gaussians, 10.0 * seen, seen, body.v_template, body) is gaussians.rgb
 
 
 def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
@@ -112,8 +128,8 @@ def test_no_gaussian_stands_off_those_around_it_and_the_others_stay(body):
     off = np.arange(len(gaussians)) % 50 == 0
     size = face_frames(body.v_template, body.faces).k[gaussians.face]
     gaussians.mu[off, 1] += 0.06 / size[off]
-    out = unseen.level_heights(gaussians, body.v_template, body.faces)
-    assert (size * out.mu[:, 1])[off].max() < unseen.STEP + 0.005
+    out = heights.level_heights(gaussians, body.v_template, body.faces)
+    assert (size * out.mu[:, 1])[off].max() < heights.STEP + 0.005
     np.testing.assert_allclose(out.mu[~off], gaussians.mu[~off], atol=1e-6)
     np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
 
@@ -124,16 +140,16 @@ def test_a_disc_that_sticks_out_of_the_surface_shrinks(body):
     out_of = np.arange(len(gaussians)) % 50 == 0
     gaussians.quat[out_of] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
     gaussians.log_scale[out_of, 2] = np.log(0.05 / size[out_of])
-    out = unseen.level_heights(gaussians, body.v_template, body.faces)
-    assert (size * np.exp(out.log_scale[:, 2]))[out_of].max() == pytest.approx(unseen.STEP, rel=1e-4)
+    out = heights.level_heights(gaussians, body.v_template, body.faces)
+    assert (size * np.exp(out.log_scale[:, 2]))[out_of].max() == pytest.approx(heights.STEP, rel=1e-4)
 
 
 def test_the_discs_of_a_coarse_level_keep_the_width_that_covers_the_body(body):
-    gaussians = Gaussians.area(body.v_template, body.faces, unseen.SPARSE // 4)
+    gaussians = Gaussians.area(body.v_template, body.faces, heights.SPARSE // 4)
     size = face_frames(body.v_template, body.faces).k[gaussians.face]
     gaussians.quat[:] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
-    gaussians.log_scale[:, 2] = np.log(1.8 * unseen.STEP / size)
-    out = unseen.level_heights(gaussians, body.v_template, body.faces)
+    gaussians.log_scale[:, 2] = np.log(1.8 * heights.STEP / size)
+    out = heights.level_heights(gaussians, body.v_template, body.faces)
     np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
 
 
@@ -143,7 +159,7 @@ def test_what_is_shown_little_for_its_size_is_not_seen(body):
     area = (frames.k[gaussians.face] * np.exp(gaussians.log_scale[:, 0])) ** 2
     pixels = 4000 * area
     pixels[:100] *= 0.1
-    assert pixels[:100].max() > unseen.LEAST_SHOWN
-    seen = unseen.find_seen(pixels, gaussians, body.v_template, body.faces)
-    assert not seen[:100].any() and seen[100:][pixels[100:] > unseen.LEAST_SHOWN].all()
-    assert not unseen.find_seen(np.zeros(len(gaussians)), gaussians, body.v_template, body.faces).any()
+    assert pixels[:100].max() > shown.LEAST_SHOWN
+    seen = shown.find_seen(pixels, gaussians, body.v_template, body.faces)
+    assert not seen[:100].any() and seen[100:][pixels[100:] > shown.LEAST_SHOWN].all()
+    assert not shown.find_seen(np.zeros(len(gaussians)), gaussians, body.v_template, body.faces).any()
