@@ -16,7 +16,7 @@ ALONG = 8.0
 """What a length along a limb counts, over one around it."""
 TURNED = 0.1
 """m that two faces are farther apart where their normals differ by 1: the chest's print does not come through to the back."""
-MANY = 200
+MANY = 100
 """Gaussians that a colour is mixed of."""
 CLOSE = 0.01
 """m of the stretched space, the distance up to which gaussians count alike."""

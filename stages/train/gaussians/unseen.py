@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.stages.train.gaussians.around_limbs import hold_colours, mix_colours, stretch
@@ -67,17 +67,30 @@ def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, re
     if not len(poor) or not len(known):
         return gaussians.rgb
     frames = face_frames(rest, body.faces)
-    normals = frames.R[:, :, 1]
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+    beside = known[find_nearest(bound.means[known], bound.means[poor], NEIGHBOURS)]
+    out = gaussians[np.arange(len(gaussians))]
+    out.rgb[poor] = gaussians.rgb[beside].mean(1)
+    out.rgb[poor] = hold_colours(out, poor, beside, frames.R[:, :, 1])
+    away = np.linalg.norm(bound.means[beside[:, 0]] - bound.means[poor], axis=1)
+    far = away > BESIDE
+    share = np.minimum((away[far] - BESIDE) / (FAR - BESIDE), 1)[:, None]
+    around = colour_far(gaussians, bound, pixels, seen, poor[far], frames, body)
+    out.rgb[poor[far]] += share * (around - out.rgb[poor[far]])
+    return out.rgb
+
+
+def colour_far(gaussians: Gaussians, bound: Bound, pixels: np.ndarray, seen: np.ndarray, far: np.ndarray, frames: FaceFrames,
+               body: Body) -> np.ndarray:
+    """(M, 3) colours of unseen gaussians, far (M,), mixed of those seen around the limb, of well seen ones most.
+
+    bound, frames: gaussians and faces at rest; pixels, seen: (N,) as in `colour_unseen`.
+    """
+    known, normals = np.flatnonzero(seen), frames.R[:, :, 1]
     areas, places = divisible_areas(bound), stretch(bound, gaussians.face, frames, body)
     evidence = find_evidence(pixels, areas, seen, *find_place(bound.means, normals[gaussians.face]))
     shown = pixels / areas
     trust = np.minimum(shown / max(float(np.median(shown[known])), 1e-12), 1) * np.minimum(evidence, 1)
     out = gaussians[np.arange(len(gaussians))]
-    mixed, around = mix_colours(gaussians.rgb[known], trust[known], places[known], places[poor])
-    beside = known[find_nearest(bound.means[known], bound.means[poor], NEIGHBOURS)]
-    away = np.linalg.norm(bound.means[beside[:, 0]] - bound.means[poor], axis=1)
-    share = np.clip((away - BESIDE) / (FAR - BESIDE), 0, 1)[:, None]
-    out.rgb[poor] = share * mixed + (1 - share) * gaussians.rgb[beside].mean(1)
-    out.rgb[poor] = hold_colours(out, poor, known[around], normals)
-    return out.rgb
+    out.rgb[far], around = mix_colours(gaussians.rgb[known], trust[known], places[known], places[far])
+    return hold_colours(out, far, known[around], normals)
