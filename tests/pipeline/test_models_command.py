@@ -13,6 +13,7 @@ from gsac.avatar.mmpose_file import read_mmpose
 from gsac.avatar.network_files import MODELS, OPTIONAL
 from gsac.avatar.simcc import SimccNetwork
 from gsac.cache.store import Store
+from gsac.pipeline import model_store
 from gsac.pipeline.cli import execute
 from gsac.pipeline.model_store import ModelStore
 from gsac.pipeline.outcomes import ExitCode
@@ -111,6 +112,17 @@ def test_every_network_that_can_be_pulled_is_listed_and_suggested(models, capsys
     for name in (*MODELS, *OPTIONAL):
         assert execute(["models", "pull", name[:-2] + name[-1]]) == ExitCode.USAGE
         assert f"(did you mean {name}?)" in capsys.readouterr().err and name in listed
+
+
+@pytest.mark.parametrize(("name", "words"), [
+    ("face_landmrak", "unknown model file face_landmrak (did you mean face_landmark?)"),
+    ("mine", "model file mine cannot be pulled; bring it with `gsac models add mine FILE`")])
+def test_a_name_that_cannot_be_pulled_is_refused_before_any_other_is_pulled(models, monkeypatch, capsys, name, words):
+    monkeypatch.setattr(model_store, "download", lambda *words: pytest.fail("pulled"))
+    execute(["models", "add", "mine", str(OPEN_BODY)])
+    models.path("mine").unlink()
+    assert execute(["models", "pull", "vgg-hed", name]) == ExitCode.USAGE
+    assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["open", "none", "auto"])
