@@ -24,6 +24,8 @@ MOST_PIXELS = 8192 * 4320
 CONTAINERS = ("mov", "matroska", "webm", "avi", "mpegts", "mpeg", "mpegvideo", "flv", "asf", "ogg", "mxf", "dv", "ivf", "m4v",
               "h264", "hevc", "obu", "yuv4mpegpipe", "gif")
 """What ffmpeg may take a video's content for. It knows others that name further files, as playlists do, or that are programs."""
+SLOTTED = "avi"
+"""ffmpeg's name of the container whose header counts slots of time in place of frames."""
 LIMITS = {"format_whitelist": ",".join(CONTAINERS), "protocol_whitelist": "file", "max_pixels": str(MOST_PIXELS)}
 """ffmpeg's options for a file that anybody may have made."""
 
@@ -93,15 +95,29 @@ def open_video(path: Path, **options: str) -> InputContainer:
     return av.open(file_url(path), options=LIMITS | options, metadata_errors="ignore")
 
 
-def count_stored(path: Path, video: Video) -> int:
-    """Number of the video's frames that are in the file, among them those that it keeps and does not show, as where it was trimmed
-    without loss."""
+def count_frames(path: Path, video: Video) -> tuple[int, int]:
+    """Number of the video's frames by its header, and of those that are in the file, among them those that it keeps and does not
+    show, as where it was trimmed without loss."""
+    sent = []
     with open_video(path, ignore_editlist="1") as container:
-        count = 0
         with contextlib.suppress(FFmpegError):  # a truncated file, as in _packet_times
-            for packet in container.demux(container.streams[video.stream]):
-                count += packet.size > 0 and not packet.is_corrupt
-        return count
+            sent += [packet.dts for packet in container.demux(container.streams[video.stream])
+                     if packet.size > 0 and not packet.is_corrupt]
+        slotted = container.format.name == SLOTTED
+    if slotted and None not in sent and len(used := np.unique(np.array(sent, np.int64))) > 1:
+        return len(sent) + count_promised(used, video.declared_frames), len(sent)
+    return video.declared_frames, len(sent)
+
+
+def count_promised(used: np.ndarray, slots: int) -> int:
+    """Number of frames that an AVI's header promises after those that are there, at their pace.
+
+    used: (N,) int64, rising, N >= 2, the slots of frames that are there. slots: of which the header tells the number; those between
+    two frames are empty, as many as 19 where a clip was copied in without encoding. After the last frame fewer than between any two
+    are no promise: it lasts so long.
+    """
+    left = slots - 1 - int(used[-1])
+    return left * (len(used) - 1) // int(used[-1] - used[0]) if left >= np.diff(used).max() else 0
 
 
 def _is_text(path: Path) -> bool:

@@ -23,7 +23,7 @@ from gsac.stages.split.people import People, find_shown
 from gsac.stages.split.photos import write_plate_of_video
 from gsac.stages.split.pick import fit_size
 from gsac.stages.split.picture_quality import Look, judge_pictures
-from gsac.stages.split.probe import Video, count_stored, probe
+from gsac.stages.split.probe import Video, count_frames, probe
 from gsac.stages.split.upright import LARGE_ENOUGH, LOOKS, describe_quarters, find_quarters
 from gsac.stages.split.writing import Writing, frame_size, write_one_scene
 
@@ -85,8 +85,10 @@ def read_ticks(path: Path, warn: Callable[[Finding], None]) -> tuple[Video, Frac
         video.ticks = np.unique(np.array(shown, np.int64))
     if not len(video.ticks):
         raise BadInput(f"{path.name}: holds no frame; record the clip again.")
-    if video.declared_frames > len(video.ticks) and video.declared_frames > (stored := count_stored(path, video)):
-        warn(Finding.of(Code.VIDEO_TRUNCATED, figure=stored, name=path.name, declared=video.declared_frames))
+    if video.declared_frames > len(video.ticks):
+        declared, stored = count_frames(path, video)
+        if declared > stored:
+            warn(Finding.of(Code.VIDEO_TRUNCATED, figure=stored, name=path.name, declared=declared))
     return video, base
 
 

@@ -183,6 +183,31 @@ def test_a_truncated_video_keeps_what_decodes_and_says_how_many(tmp_path):
     assert "60 frames" in warnings[0] and str(len(frames)) in warnings[0]
 
 
+AVI = {
+    "copied": ("-c:v", "libx264", "-bf", "2", "-g", "5"), "copied at odd times": ("-c:v", "libx264", "-g", "5", "-fps_mode", "vfr"),
+    "encoded": ("-c:v", "mpeg4", "-g", "5"), "encoded with sound": ("-c:v", "mpeg4", "-g", "5", "-c:a", "libmp3lame", "-shortest"),
+}
+
+
+@pytest.mark.parametrize("kind", AVI)
+def test_an_avi_is_whole_where_slots_of_time_are_empty_and_truncated_where_frames_are_missing(tmp_path, kind):
+    sound = ["-f", "lavfi", "-i", "sine=duration=2"] if "sound" in kind else []
+    filters = "select='not(eq(mod(n,4),2))'" if "odd" in kind else None
+    copied, frames = kind.startswith("copied"), 45 if filters else 60
+    source = make_clip(tmp_path / f"source.{'mp4' if copied else 'avi'}", *sound, *AVI[kind], seconds=2, filters=filters)
+    whole, cut = tmp_path / "whole.avi", tmp_path / "cut.avi"
+    ffmpeg("-i", source, "-c", "copy", whole) if copied else source.rename(whole)
+    with av.open(str(whole)) as container:
+        assert (container.streams.video[0].frames > frames) == (kind != "encoded")
+    assert split(whole, tmp_path / "whole", fps=None)[2] == []
+    content = whole.read_bytes()
+    cut.write_bytes(content[:content.index(b"movi") + (len(content) - content.index(b"movi")) // 2])
+    _, there, warnings = split(cut, tmp_path / "cut", fps=None)
+    assert frames // 4 < len(there) < frames - 2
+    said = next(warning for warning in warnings if "cut.avi is truncated" in warning)
+    assert abs(int(said.split(" promises ")[1].split(" frames")[0]) - frames) <= 2
+
+
 def test_a_clip_that_was_trimmed_without_loss_is_whole_unless_it_is_cut_off(tmp_path):
     whole = make_clip(tmp_path / "a.mp4", "-g", "10", size="320x240")
     trimmed, shorter, cut = (tmp_path / name for name in ("trimmed.mp4", "shorter.mp4", "cut.mp4"))
