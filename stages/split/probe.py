@@ -37,7 +37,8 @@ class Video:
     stream: int
     """Index of the video stream in the file."""
     ticks: np.ndarray
-    """(N,) int64 presentation times, rising, in time_base; empty where the container has none."""
+    """(N,) int64 presentation times, rising, in time_base, of all frames that need none from before the file's beginning; empty
+    where the container has none."""
     key_ticks: np.ndarray
     """(K,) int64, those of them whose frame needs no other one."""
     sent: np.ndarray
@@ -137,6 +138,7 @@ def _probe(container: InputContainer, path: Path) -> Video:
     stream.codec_context.options = {"max_pixels": LIMITS["max_pixels"]}
     picture = _first_picture(container, stream, path)
     ticks, key_ticks, sent = _packet_times(path, stream.index)
+    whole = ticks >= _find_start(key_ticks, picture.pts)
 
     width, height = picture.width, picture.height
     aspect = stream.sample_aspect_ratio or Fraction(1)
@@ -155,8 +157,8 @@ def _probe(container: InputContainer, path: Path) -> Video:
     hidden_alpha = codec in ("vp8", "vp9") and tags.get("alpha_mode") == "1"
     rate = stream.average_rate or stream.guessed_rate
     return Video(
-        stream=stream.index, ticks=ticks, key_ticks=key_ticks, sent=sent, time_base=stream.time_base or Fraction(1, 1_000_000),
-        declared_frames=stream.frames, width=width, height=height,
+        stream=stream.index, ticks=ticks[whole], key_ticks=key_ticks, sent=sent[whole[:len(sent)]],
+        time_base=stream.time_base or Fraction(1, 1_000_000), declared_frames=stream.frames, width=width, height=height,
         transfer=int(picture.color_trc), primaries=int(picture.color_primaries), matrix=int(picture.colorspace),
         has_alpha=hidden_alpha or any(c.is_alpha for c in picture.format.components),
         interlaced=picture.interlaced_frame,
@@ -201,6 +203,12 @@ def _packet_times(path: Path, index: int) -> tuple[np.ndarray, np.ndarray, np.nd
     rising, first = np.unique(np.array(ticks, np.int64), return_index=True)
     told = None not in sent and len(set(sent)) == len(rising) == len(ticks)
     return rising, np.unique(np.array(keys, np.int64)), np.array(sent if told else [], np.int64)[first if told else []]
+
+
+def _find_start(key_ticks: np.ndarray, first: int | None) -> int:
+    """Tick before which no frame decodes, where the video begins between key frames, as one that was trimmed without loss, or with
+    frames that are shown before its first key frame and need the one before. first: tick of the first picture that decodes."""
+    return min(first, int(key_ticks[0])) if first is not None and len(key_ticks) else np.iinfo(np.int64).min
 
 
 def _reason(error: Exception) -> str:

@@ -224,6 +224,34 @@ def test_a_clip_that_was_trimmed_without_loss_is_whole_unless_it_is_cut_off(tmp_
     assert "cut.mp4 is truncated: its header promises 20 frames" in warnings[0]
 
 
+OPEN = {"h264": ("-c:v", "libx264", "-x264-params", "keyint=10:scenecut=0"),
+        "hevc": ("-c:v", "libx265", "-x265-params", "log-level=error:keyint=10:open-gop=1:scenecut=0")}
+
+
+@pytest.mark.parametrize(("name", "codec", "cut"), [
+    ("a.ts", "hevc", ("-ss", 0.5)), ("a.mp4", "hevc", ("-ss", 0.5, "-use_editlist", 0)),
+    ("a.mkv", "h264", ("-copyinkf", "-copypriorss", 0, "-ss", 0.5)), ("a.ts", "h264", ("-copyinkf", "-copypriorss", 0, "-ss", 0.5)),
+])
+def test_a_clip_that_begins_with_frames_which_need_earlier_ones_begins_with_the_first_that_does_not(tmp_path, name, codec, cut):
+    whole, trimmed = make_clip(tmp_path / "whole.mp4", *OPEN[codec], size="320x240"), tmp_path / name
+    seeks = "-copyinkf" not in cut
+    ffmpeg(*(cut[:2] if seeks else ()), "-i", whole, "-c", "copy", *(cut[2:] if seeks else cut), trimmed)
+    _, every, _ = split(whole, tmp_path / "whole", fps=None)
+    clip, frames, warnings = split(trimmed, tmp_path / "out", fps=None)
+    first = len(every) - len(frames)
+    assert first in (10, 20) and all(map(np.array_equal, frames, every[first:])) and "damaged" not in " ".join(warnings)
+    assert np.diff(clip.timestamps_s) == pytest.approx(1 / 30, abs=2e-3) and clip.timestamps_s[0] == 0
+    assert len(split(trimmed, tmp_path / "quick", quick=True, count=3)[1]) == 3
+
+
+def test_a_first_frame_that_is_damaged_is_said_to_be(tmp_path):
+    source = make_clip(tmp_path / "a.mov", "-c:v", "png", size="64x48", rate=10)
+    start, first, *frames = source.read_bytes().split(b"IDAT")
+    source.write_bytes(b"IDAT".join([start, b"\xff" * 40 + first[40:], *frames]))
+    _, frames, warnings = split(source, tmp_path / "out", fps=None)
+    assert len(frames) == 9 and "a.mov is damaged: 1 of the 10 frames to keep do not decode" in warnings[0]
+
+
 def test_a_clip_most_of_whose_frames_are_damaged_gives_the_others_and_says_so(tmp_path):
     source = make_clip(tmp_path / "a.mov", "-c:v", "png", size="64x48", rate=10)
     start, *frames = source.read_bytes().split(b"IDAT")
