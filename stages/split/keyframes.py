@@ -15,18 +15,19 @@ from gsac.stages.split.probe import Video, open_video
 
 def read_key_frames(path: Path, video: Video, count: int, width: int, height: int) -> Iterator[np.ndarray]:
     """Yields (height, width, 3) uint8 of at most `count` key frames, as shown and turned by the video's `quarters`, spread evenly;
-    ends early where one is damaged.
+    ends early where one is damaged. Where a clip was trimmed to what lies between two of them, yields its first frame.
 
     HDR is not tone-mapped.
     """
+    keyed = len(video.key_ticks) > 0
     with open_video(path) as container:
         stream = container.streams[video.stream]
         assert isinstance(stream, av.VideoStream)
-        stream.codec_context.skip_frame = "NONKEY"
-        for tick in video.key_ticks[pick_evenly(len(video.key_ticks), count)]:
+        stream.codec_context.skip_frame = "NONKEY" if keyed else "DEFAULT"
+        for tick in video.key_ticks[pick_evenly(len(video.key_ticks), count)] if keyed else video.ticks[:1]:
             try:
                 container.seek(int(tick), stream=stream)
-                frame = next(container.decode(stream), None)
+                frame = next((frame for frame in container.decode(stream) if frame.pts is None or frame.pts >= tick), None)
             except FFmpegError:
                 return
             if frame is None:

@@ -63,8 +63,8 @@ class Writing:
         picks = pick_frames(self.times, scene, self.config, self.chains)
         ticks = self.video.ticks[scene.first:scene.last + 1]
         own_keys = self.video.key_ticks[np.isin(self.video.key_ticks, ticks)]
-        return picks, *write_about_person(self.path, replace(self.video, key_ticks=own_keys), self.frames, self.config, self.people,
-                                          partial(self.write, picks))
+        video = replace(self.video, ticks=ticks, key_ticks=own_keys)
+        return picks, *write_about_person(self.path, video, self.frames, self.config, self.people, partial(self.write, picks))
 
     def write(self, picks: np.ndarray, crop: Crop | None) -> Written:
         """Writes the frames `picks` (K,), cut to the crop."""

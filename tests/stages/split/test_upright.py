@@ -107,6 +107,16 @@ def tag(path: Path, *options: str) -> Path:
     return tagged
 
 
+def test_who_lies_in_a_clip_that_was_trimmed_to_frames_between_key_frames_stands_in_the_frames(tmp_path, red_heads):
+    trimmed = tag(make_clip(tmp_path / "a/clip.mkv", 1), "-ss", "0.2")
+    video = probe(trimmed)
+    assert len(video.ticks) == FRAMES - 2 and len(video.key_ticks) == 0
+    frames, (told,) = split(trimmed, tmp_path / "out")
+    assert told.figure == 3
+    for t, frame in enumerate(frames, 2):
+        assert np.abs(frame.astype(int) - person(t)).mean() < 3
+
+
 def test_a_tag_for_the_wrong_side_is_put_right(tmp_path, red_heads):
     tagged = tag(make_clip(tmp_path / "a/clip.mkv", 1), "-display_rotation", "180")
     frames, (told,) = split(tagged, tmp_path / "out")
