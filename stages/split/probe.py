@@ -186,14 +186,16 @@ def _first_picture(container: InputContainer, stream: av.VideoStream, path: Path
 
 def _packet_times(path: Path, index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(N,) rising ticks of the intact packets of one stream, (K,) of its key frames, and (N,) when each is decoded; the first two
-    are empty if any has no time, the last if it is not told."""
+    are empty if any has no time, the last if it is not told. An AVI tells when frames are decoded alone: where they are shown at
+    other times, ffmpeg's guess is off by the decoder's delay."""
     ticks, keys, sent, none = [], [], [], np.zeros(0, np.int64)
     with open_video(path) as container:
+        slotted = container.format.name == SLOTTED
         try:
             for packet in container.demux(container.streams[index]):
                 if packet.size == 0 or packet.is_discard or packet.is_corrupt:
                     continue
-                if packet.pts is None:
+                if packet.pts is None or (slotted and packet.pts != packet.dts):
                     return none, none, none
                 ticks.append(packet.pts)
                 sent.append(packet.dts)

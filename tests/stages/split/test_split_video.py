@@ -200,6 +200,9 @@ def test_an_avi_is_whole_where_slots_of_time_are_empty_and_truncated_where_frame
     with av.open(str(whole)) as container:
         assert (container.streams.video[0].frames > frames) == (kind != "encoded")
     assert split(whole, tmp_path / "whole", fps=None)[2] == []
+    for quick in (False, True):
+        _, kept, warnings = split(whole, tmp_path / f"few{quick}", count=8, quick=quick)
+        assert (len(kept), warnings) == (8, [])
     content = whole.read_bytes()
     cut.write_bytes(content[:content.index(b"movi") + (len(content) - content.index(b"movi")) // 2])
     _, there, warnings = split(cut, tmp_path / "cut", fps=None)
