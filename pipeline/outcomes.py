@@ -22,7 +22,8 @@ class ExitCode(IntEnum):
 
 _EXIT_CODES = {
     ExitCode.OK: "all is well",
-    ExitCode.FAILED: "a stage failed, or the cache could not keep its result; of `check`: the clip filmed again would be better",
+    ExitCode.FAILED: "a stage failed, or the cache could not keep its result; of `batch`: a clip failed, or, with `--dry-run`, "
+                     "cannot run; of `check`: the clip filmed again would be better",
     ExitCode.USAGE: "the command line, a parameter or an input file is at fault; of `check`: nothing can come of the clip",
     ExitCode.STALE: "something is not up to date",
     ExitCode.INTEGRITY: "the cache holds something else than was put there",

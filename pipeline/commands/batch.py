@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from gsac.pipeline.batch import find_clips, make_jobs, run_batch
-from gsac.pipeline.batch_entry import Status
+from gsac.pipeline.batch_entry import Entry, Status
 from gsac.pipeline.batch_plan import BatchPlanner, ClipPlan
 from gsac.pipeline.batch_record import FILE, BatchRecord, read_request
 from gsac.pipeline.batch_reporter import open_batch_reporter
@@ -76,7 +76,9 @@ def declare(command: argparse.ArgumentParser) -> None:
     command.add_argument("--changed-only", action="store_true",
                          help="leave clips that the last batch of --out has done, and whose file is the same, as they are, though "
                               "code or parameters are others")
-    command.add_argument("--dry-run", action="store_true", help="say what each clip needs, and how long it would take")
+    command.add_argument("--dry-run", action="store_true",
+                         help="say what each clip needs and how long it would take, and which cannot run, with the exit code of a "
+                              "batch in which they fail")
     add_quality(command)
     add_person(command)
     add_params(command)
@@ -112,10 +114,10 @@ def run(arguments: argparse.Namespace, reporter: PlainReporter, journal: Journal
     limits = Limits(workers, arguments.memory * 1024 if arguments.memory else SHARE * machine_mb(), arguments.address)
     due = [plan for plan in plans if not plan.unchanged]
     journal.note(foretell(plans, len(kept), None if arguments.executor == "ray" else workers))
-    if arguments.dry_run:
-        return dry_run(plans, reporter, arguments.json)
-    planner.keys.pull_models({stage for plan in due for stage in plan.due}, journal.note)
     page = BatchPage(arguments.out, jobs)
+    if arguments.dry_run:
+        return dry_run(plans, kept, reporter, arguments.json)
+    planner.keys.pull_models({stage for plan in due for stage in plan.due}, journal.note)
     arguments.out.mkdir(parents=True, exist_ok=True)
     with EventFile(arguments.out.absolute(), NOT_KEPT) as file, journal.heard_by(file.take), journal.heard_by(record.take):
         for job, earlier in kept.items():
@@ -217,15 +219,20 @@ def foretell(plans: list[ClipPlan], kept: int, workers: int | None) -> str:
     return ", ".join([*parts, f"{len(due)} to do", where, *filter(None, [time])])
 
 
-def dry_run(plans: list[ClipPlan], reporter: PlainReporter, json: bool) -> ExitCode:
-    """A line for each clip that needs something."""
+def dry_run(plans: list[ClipPlan], kept: dict[ClipJob, Entry], reporter: PlainReporter, json: bool) -> ExitCode:
+    """A line for each clip that fails or needs something. FAILED where the batch would end so, as far as that is known before
+    anything runs. kept: clips that are left as they are, which may be failures."""
+    failed = {plan.job.name: plan.error for plan in plans if plan.error}
+    failed |= {job.name: entry.error for job, entry in kept.items() if entry.status is Status.FAILED}
+    for name, error in failed.items():
+        reporter.result(f"{name}: {error}")
     for plan in plans:
-        if not plan.unchanged:
+        if plan.due:
             time = f", about {duration(plan.seconds)}" if plan.seconds else ""
-            reporter.result(f"{plan.job.name}: {plan.error or f'{plan.due[0]} to {plan.due[-1]}{time}'}")
+            reporter.result(f"{plan.job.name}: {plan.due[0]} to {plan.due[-1]}{time}")
     if json:
         emit({"outputs": {}, "clips": [plan.to_json() for plan in plans]})
-    return ExitCode.OK
+    return ExitCode.FAILED if failed else ExitCode.OK
 
 
 def conclude(record: BatchRecord, results: dict[str, ClipResult], page: BatchPage, journal: Journal, json: bool) -> ExitCode:

@@ -66,8 +66,20 @@ def test_a_dry_run_tells_which_clips_the_run_would_refuse(toy, clips, out):
     assert f"two.mp4: {out / 'two-avatar'} is not the folder of a run and holds report.html" in plan.err
     assert "three.mp4: cut to join" in plan.err and "3 clips, 2 cannot run, 1 to do" in plan.err
     assert "one.mp4: cut to join" in replaced.err and "holds report.html" in replaced.err
+    assert plan.code == replaced.code == done.code == 1
     assert statuses(done) == {"one": "failed", "two": "failed", "three": "done"}
     assert all(row["error"] in plan.err for row in done.json["clips"] if row["status"] == "failed")
+
+
+def test_a_dry_run_ends_well_only_where_the_batch_could(toy, clips, out):
+    assert toy.gsac("batch", clips, "--out", out, "--dry-run").code == 0 and not out.exists()
+    (clips / "bad.mp4").write_text("")
+    assert toy.gsac("batch", clips, "--out", out).code == 1
+    left, resumed = (toy.gsac("batch", "--resume", "--out", out, *words) for words in (["--dry-run"], []))
+    assert left.code == resumed.code == 1 and "bad.mp4: stage left failed" in left.err
+    (out / "batch.html").write_text("mine")
+    codes = [toy.gsac("batch", clips, "--out", out, *words).code for words in (["--dry-run"], [])]
+    assert codes == [2, 2]
 
 
 def test_a_killed_batch_goes_on_with_its_own_words_and_leaves_what_has_ended(toy, clips, out):
