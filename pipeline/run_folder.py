@@ -73,6 +73,11 @@ class RunFolder:
         return (self.root / DAG).is_file() and os.path.lexists(self.clip)
 
     @property
+    def outer(self) -> Path | None:
+        """The folder of another run in which it lies, or would lie, links followed; None where it lies in none."""
+        return next((folder for folder in Path(os.path.realpath(self.root)).parents if RunFolder(folder).is_run), None)
+
+    @property
     def clip(self) -> Path:
         """The link to the source clip."""
         return self.root / CLIP
@@ -247,9 +252,8 @@ class RunFolder:
             except BadInput as e:
                 raise BadInput(f"{self.root} holds another project's {DAG} ({e}); choose another --out") from e
             return
-        around = next((folder for folder in Path(os.path.realpath(self.root)).parents if RunFolder(folder).is_run), None)
-        if around is not None:
-            raise BadInput(f"{self.root} lies in {around}, the folder of another run; choose another --out")
+        if self.outer is not None:
+            raise BadInput(f"{self.root} lies in {self.outer}, the folder of another run; choose another --out")
         photos = find_photos(self.root) if self.root.is_dir() else []
         if len(photos) > 1:
             raise BadInput(f"{self.root} holds {len(photos)} photos, a clip of its own, which would hold results then; "

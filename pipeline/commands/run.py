@@ -113,5 +113,12 @@ def own_quality(run_folder: RunFolder, asked: str | None) -> str:
 
 
 def default_out(clip: Path) -> Path:
-    """`<clip>-avatar` here, by the name that the user gave, be it a link's."""
-    return Path.cwd() / avatar_name(Path(os.path.abspath(clip)))
+    """`<clip>-avatar` here, by the name that the user gave, be it a link's. BadInput in the folder of a run, where no other one's
+    may lie; it says how to have it beside that."""
+    out = Path.cwd() / avatar_name(Path(os.path.abspath(clip)))
+    outer = RunFolder(out).outer
+    if outer is not None and not RunFolder(out).is_run:
+        beside = shlex.quote(os.path.relpath(outer.parent / out.name, os.path.realpath(Path.cwd())))
+        raise BadInput(f"this folder is that of a run, {outer}, and no other run's folder can lie in it; give `--out {beside}`, "
+                       "too, to have it beside that one")
+    return out

@@ -1,6 +1,7 @@
 """A folder that holds another clip's avatar is not silently made this one's; a mistake leaves no folder."""
 
 import json
+import re
 
 import pytest
 
@@ -124,6 +125,20 @@ def test_nothing_of_a_run_is_written_into_the_folder_of_another(toy, other, insi
     for dry in ([], ["--dry-run"]):
         done = toy.gsac("run", other, "--out", toy.out / inside, *dry)
         assert done.code == 2 and f"{toy.out / inside} lies in {toy.out}, the folder of another run; choose" in done.err
+    assert sorted(toy.out.rglob("*")) == before
+
+
+@pytest.mark.parametrize("inside", [".", "export"])
+def test_a_clip_that_is_run_from_within_another_runs_folder_is_refused_with_the_words_that_work(toy, other, inside):
+    toy.ran()
+    (toy.out / inside).mkdir(exist_ok=True)
+    before = sorted(toy.out.rglob("*"))
+    refused = toy.gsac("run", other, cwd=toy.out / inside)
+    assert refused.code == 2 and f"this folder is that of a run, {toy.out}" in refused.err
+    words = re.search(r"give `(--out [^`]+)`", " ".join(refused.err.split()))
+    assert words is not None
+    assert toy.gsac("run", other, *words[1].split(), cwd=toy.out / inside).code == 0
+    assert (toy.out.parent / "other-avatar" / "join" / "out.txt").read_text() == "OMEGA OMEGA"
     assert sorted(toy.out.rglob("*")) == before
 
 
