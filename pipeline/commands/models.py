@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-from gsac.avatar.network_files import BROUGHT, MODELS, OPTIONAL, SLOTS
+from gsac.avatar.network_files import BROUGHT, MODELS, OPTIONAL, SLOTS, licence_of
 from gsac.pipeline.commands.options import add_json, answer_reporter, open_store, progress_reporter
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.model_check import check_model
@@ -42,11 +42,9 @@ def do_ls(arguments: argparse.Namespace) -> ExitCode:
     reporter = answer_reporter(arguments)
     models = ModelStore(open_store(reporter))
     brought = models.brought
-    ours = MODELS | OPTIONAL
-    rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name),
-             "licence": ours[name].licence if name in ours else "your own"}
+    rows = [{"name": name, "sha256": models.sha256(name), "here": models.is_here(name), "licence": licence_of(name)}
             for name in (*MODELS, *sorted({*brought} - {*MODELS}))]
-    rows += [{"name": name, "sha256": "", "here": False, "licence": ours[name].licence if name in ours else "your own"}
+    rows += [{"name": name, "sha256": "", "here": False, "licence": licence_of(name)}
              for name in (*OPTIONAL, *BROUGHT, *SLOTS) if name not in brought]
     for row in rows:
         absent = "missing" if row["sha256"] else "not pulled" if row["name"] in OPTIONAL else "not brought"

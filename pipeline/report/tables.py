@@ -85,7 +85,7 @@ def provenance(results: Results) -> dict[str, list]:
 
 def networks(results: Results) -> list[dict[str, str]]:
     """Name, digest and licence of each model file that the run's stages need."""
-    from gsac.avatar.network_files import MODELS
+    from gsac.avatar.network_files import licence_of
     from gsac.stages.contract import make_config
 
     found: dict[str, dict[str, str]] = {}
@@ -95,11 +95,17 @@ def networks(results: Results) -> list[dict[str, str]]:
             needed = stage.models(make_config(stage, row.get("params") or {}))
         except Exception:  # a stage of another version: its needs are unknown here
             continue
-        for model in needed:
-            known = MODELS.get(model)
-            found[model] = {"name": model, "sha256": known.sha256 if known else "brought by the user",
-                            "licence": known.licence if known else "the user's to know"}
+        found |= {model: {"name": model, "sha256": published_digest(model), "licence": licence_of(model)} for model in needed}
     return list(found.values())
+
+
+def published_digest(model: str) -> str:
+    """Digest of a network's file as it was published, with the wheel that holds it where that is one of its own."""
+    from gsac.avatar.network_files import MODELS, OPTIONAL
+
+    if model in OPTIONAL:
+        return f"{OPTIONAL[model].sha256} in {OPTIONAL[model].wheel}"
+    return MODELS[model].sha256 if model in MODELS else "brought by the user"
 
 
 def body_model(results: Results) -> list[dict[str, str]]:

@@ -5,8 +5,7 @@ import shutil
 
 import pytest
 
-from gsac.avatar.network_files import MODELS, OPTIONAL
-from gsac.pipeline.lineage import BROUGHT, model_licence
+from gsac.avatar.network_files import MODELS, OPTIONAL, OWN_LICENCE, licence_of
 from support.toy import Toy
 
 
@@ -76,9 +75,9 @@ def test_what_the_cache_does_not_know_is_named(finished, inside):
 
 def test_a_model_file_comes_with_its_licence():
     for name, model in (MODELS | OPTIONAL).items():
-        assert model_licence(name, model.sha256) == model.licence
-    assert model_licence("my_body", "0" * 64) == BROUGHT
-    assert model_licence(next(iter(MODELS)), "0" * 64) == BROUGHT
+        assert licence_of(name, model.sha256) == model.licence
+    assert licence_of("my_body", "0" * 64) == OWN_LICENCE
+    assert licence_of(next(iter(MODELS)), "0" * 64) == OWN_LICENCE
 
 
 def test_a_lineage_is_one_object_of_plain_json(finished, inside):

@@ -18,6 +18,7 @@ import pytest
 from gsac.avatar.artifacts import Clip, write_arrays
 from gsac.avatar.body import LOST, Body, BodyParams
 from gsac.avatar.frame_files import read_frame, write_alpha, write_frame
+from gsac.avatar.network_files import OWN_LICENCE
 from gsac.avatar.wholebody import HANDS, INDEX
 from gsac.avatar.zbuffer import silhouette
 from gsac.benchmarks.viewer import browser as chromium
@@ -373,6 +374,16 @@ def test_models_are_named_with_digest_and_licence(copied):
     text = page_of(copied).text("footer")
     assert Body.load().digest in text and "CC0-1.0" in text and "gsac 0" in text
     assert re.search(r"pose_landmark\w* Apache-2.0 [0-9a-f]{64}", text)
+
+
+@pytest.mark.parametrize(("params", "name"), [({"lpips": "vgg-hed"}, "vgg-hed"), ({"lpips": "loss"}, "lpips-vgg")])
+def test_a_networks_terms_are_those_that_the_list_of_models_tells(copied, monkeypatch, tmp_path, capsys, params, name):
+    monkeypatch.setenv("GSAC_CACHE", str(tmp_path / "cache"))
+    execute(["models", "ls", "--json"])
+    licence, = (row["licence"] for row in json.loads(capsys.readouterr().out.splitlines()[-1])["models"] if row["name"] == name)
+    write_run(copied, [stage_row("train", params=params)])
+    text = page_of(copied).text("footer")
+    assert f"{name} {licence}" in text and ("brought by the user" in text) == (licence == OWN_LICENCE)
 
 
 def test_a_partial_run_says_what_was_not_part_of_it(copied):
