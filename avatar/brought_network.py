@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gsac.avatar.cuda import is_forbidden
+from gsac.avatar.cuda import stays_on_cpu
 from gsac.avatar.onnx_network import NetworkError, open_network, run_checked, run_session
 
 Shape = list[int | str | None]
@@ -47,7 +47,7 @@ def _open_onnx(path: Path, name: str) -> BroughtNetwork:
 def _open_torchscript(path: Path, name: str) -> BroughtNetwork:
     import torch
 
-    device = "cuda" if torch.cuda.is_available() and not is_forbidden() else "cpu"
+    device = "cuda" if torch.cuda.is_available() and not stays_on_cpu() else "cpu"
     try:
         network = torch.jit.load(str(path), map_location=device).eval()
     except (RuntimeError, ValueError) as e:

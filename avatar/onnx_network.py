@@ -1,5 +1,5 @@
-"""Networks that a user brings as ONNX files, run by onnxruntime: on the GPU where its provider is installed and GSAC_DEVICE allows
-it, else on the CPU."""
+"""Networks that a user brings as ONNX files, run by onnxruntime: on the GPU where there is one for the CUDA path, its provider is
+installed and GSAC_DEVICE allows it, else on the CPU."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gsac.avatar.cuda import is_forbidden
+from gsac.avatar.cuda import stays_on_cpu
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -48,14 +48,15 @@ def run_session(session: InferenceSession, ready: np.ndarray) -> list[np.ndarray
 def open_network(path: Path, name: str, threads: int = 0) -> InferenceSession:
     """Opens the ONNX file that was brought under a name, or the one in a folder where its weights lie beside it.
 
-    threads: of the CPU; 0: as many as onnxruntime likes. Raises NetworkError where the file cannot be read.
+    threads: of the CPU, which alone is used then; 0: as many as onnxruntime likes, or the GPU. Raises NetworkError where the file
+    cannot be read.
     """
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.enable_mem_pattern = False  # a plan for each size of picture, and those of people differ: 150 MB a thread
-    here = PREFERRED[-1:] if is_forbidden() else onnxruntime.get_available_providers()
+    here = PREFERRED[-1:] if threads or stays_on_cpu() else onnxruntime.get_available_providers()
     if path.is_dir():
         path = next(path.glob("*.onnx"), path)
     try:

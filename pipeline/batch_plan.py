@@ -95,7 +95,7 @@ class BatchPlanner:
         return ClipPlan(job, due, seconds, max(map(self._peak_mb, due)), digest, before_gpu=self._before_gpu(due))
 
     def _before_gpu(self, due: tuple[str, ...]) -> str:
-        first = next((n for n, name in enumerate(self.steps) if name in due and self.keys.project.stage(name).uses_device), 0)
+        first = next((n for n, name in enumerate(self.steps) if name in due and self.keys.device_of(name)), 0)
         return self.steps[first - 1] if first else ""
 
     def _plan(self, name: str, inputs: dict[str, str]) -> StagePlan:

@@ -46,7 +46,7 @@ class Keys:
 
         Empty where the result does not depend on it. BadInput where the parameter names a device that is not there.
         """
-        if not self.project.stage(name).uses_device:
+        if not self.project.stage(name).uses_device(self.configs[name]):
             return ""
         wanted = getattr(self.configs[name], "device", AUTO)
         if wanted == "cuda" != self.device:

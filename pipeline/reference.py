@@ -241,7 +241,7 @@ def _dependencies(stage: Stage) -> str:
     rows = {"model files, with the defaults": stage.models(config),
             "model files, where they are here": stage.wishes(config),
             "versions of packages": stage.packages, "programs": tuple(stage.programs()),
-            "device class": ("cpu or cuda",) if stage.uses_device else ()}
+            "device class": ("cpu or cuda",) if stage.uses_device(config) else ()}
     return "\n".join(["- its code, and the version of Python",
                       *(f"- {what}: {', '.join(names)}" for what, names in rows.items() if names)])
 

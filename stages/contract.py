@@ -55,8 +55,8 @@ class Stage:
     """Names among the wishes of which this configuration needs at least one."""
     check_on: Callable[[Any, str], None] = lambda config, device: None
     """Raises BadInput where this configuration cannot be met on a device class (cpu, cuda); called before anything runs."""
-    uses_device: bool = False
-    """Whether the device class (cpu, cuda) is part of the key."""
+    uses_device: Callable[[Any], bool] = lambda config: False
+    """Whether this configuration's result depends on the device class (cpu, cuda), which then is part of the key."""
     code: tuple[str, ...] = ()
     """First-party modules that its result depends on beside those found from its imports."""
 

@@ -28,6 +28,8 @@ def why_not() -> str | None:
     return None
 
 
-def is_forbidden() -> bool:
-    """Whether the user keeps everything off the GPU, networks that they bring among it."""
-    return os.environ.get(DEVICE) == "cpu"
+def stays_on_cpu() -> bool:
+    """Whether networks that users bring compute on the CPU: GSAC_DEVICE says so, or says nothing, and there is no GPU for the CUDA
+    path. A stage's key names the same device."""
+    named = os.environ.get(DEVICE)
+    return named == "cpu" or not named and why_not() is not None

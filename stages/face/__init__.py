@@ -23,4 +23,5 @@ STAGE = Stage(
     packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "flatbuffers", "onnxruntime", "torch", "scipy", "numba",
               "llvmlite"),
     models=lambda config: config.models(),
+    uses_device=lambda config: config.uses_device(),
 )

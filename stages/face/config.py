@@ -49,6 +49,10 @@ class FaceConfig:
         own = () if self.flame == NONE else (self.flame, self.flame_points)
         return (PLAIN, ATTENTIVE, *own, *((ENCODER,) if self.method == "deca" else ()))
 
+    def uses_device(self) -> bool:
+        """Whether a network that the user brings, which may run on a GPU, makes the result."""
+        return self.method == "deca"
+
     def check(self) -> None:
         if not 90 <= self.angle < 180:
             raise BadInput(f"face.angle is {self.angle}; expected degrees from 90 to below 180")

@@ -16,4 +16,5 @@ STAGE = Stage(
     config=KeypointsConfig,
     packages=("numpy", "opencv-contrib-python-headless", "ai-edge-litert", "onnxruntime"),
     models=lambda config: config.models(),
+    uses_device=lambda config: config.uses_device(),
 )

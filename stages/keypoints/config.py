@@ -37,6 +37,10 @@ class KeypointsConfig:
     hand_reach: float = 0.5
     """Farthest that a hand's wrist may lie from the body's wrist, in forearm lengths; a hand beyond it is not taken."""
 
+    def uses_device(self) -> bool:
+        """Whether a network that the user brings, which may run on a GPU, makes the result."""
+        return self.detector == "onnx-wholebody"
+
     def check(self) -> None:
         if (self.points == NONE) == (self.detector == "mmpose-json"):
             raise BadInput(f"keypoints.detector is {self.detector} and keypoints.points is {self.points}; expected mmpose-json "

@@ -27,4 +27,5 @@ STAGE = Stage(
     packages=("numpy", "scipy", "numba", "llvmlite", "opencv-contrib-python-headless", "ai-edge-litert", "OpenEXR", "onnxruntime",
               "torch"),
     models=lambda config: config.models(),
+    uses_device=lambda config: config.uses_device(),
 )

@@ -27,6 +27,10 @@ class SegmentConfig:
     """Whether the empty scene is used: the plate that photos came with, or for a video of a still camera the median of its
     frames."""
 
+    def uses_device(self) -> bool:
+        """Whether a network that the user brings, which may run on a GPU, makes the result."""
+        return self.method == "sapiens"
+
     def check(self) -> None:
         if not 0 <= self.iterations <= 20:
             raise BadInput(f"segment.iterations is {self.iterations}; expected 0 to 20")

@@ -19,4 +19,5 @@ STAGE = Stage(
     packages=("numpy", "scipy", "numba", "llvmlite", "threadpoolctl", "opencv-contrib-python-headless", "OpenEXR", "onnxruntime",
               "torch"),
     models=lambda config: config.models(),
+    uses_device=lambda config: config.uses_device(),
 )

@@ -57,6 +57,10 @@ class SmplxConfig:
         own = tuple(name for name in (self.detector_offsets, self.start) if name != NONE)
         return (*brought_files(self.body_model), *flame, *own)
 
+    def uses_device(self) -> bool:
+        """Whether a network that the user brings, which may run on a GPU, makes the result."""
+        return self.start != NONE
+
     def check(self) -> None:
         """Raises BadInput where a value is out of range."""
         if self.method == "brought" and self.start == NONE:

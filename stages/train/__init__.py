@@ -18,7 +18,7 @@ STAGE = Stage(
         Output("heldout", check_folder),
     ),
     config=TrainConfig,
-    uses_device=True,
+    uses_device=lambda config: True,
     packages=("numpy", "numba", "llvmlite", "scipy", "threadpoolctl", "opencv-contrib-python-headless", "OpenEXR", "torch"),
     packages_on=lambda device: ("cuda-bindings", "nvidia-cuda-nvrtc") if device == "cuda" else (),
     models=lambda config: config.models(),

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from onnx import helper
 
+from gsac.avatar import cuda
 from gsac.avatar.brought_network import open_brought
 from gsac.avatar.onnx_network import PREFERRED, NetworkError, open_network
 from gsac.avatar.simcc import SimccNetwork
+from gsac.pipeline import keys
 from gsac.stages.contract import BadInput
 from gsac.stages.face.deca import CODES, DecaEncoder
 from support.onnx_files import POINTS, write_encoder, write_network
@@ -63,7 +65,9 @@ def test_outputs_that_are_no_simcc_of_the_input_are_named_with_their_shapes(tmp_
         network.read(np.zeros((500, 400, 3), np.uint8), WHOLE)
 
 
-def test_brought_networks_keep_off_a_gpu_that_the_user_forbids(monkeypatch, tmp_path):
+@pytest.mark.parametrize(("told", "gpu", "on_gpu"), [
+    ("cpu", True, False), ("cuda", False, True), (None, True, True), (None, False, False)])
+def test_brought_networks_run_on_the_device_that_the_key_names(monkeypatch, tmp_path, told, gpu, on_gpu):
     onnxruntime, torch = pytest.importorskip("onnxruntime"), pytest.importorskip("torch")
     with zipfile.ZipFile(tmp_path / "net.pt2", "w") as file:
         file.writestr("x", "")
@@ -72,9 +76,11 @@ def test_brought_networks_keep_off_a_gpu_that_the_user_forbids(monkeypatch, tmp_
     monkeypatch.setattr(onnxruntime, "InferenceSession", lambda path, options, providers: opened.append(providers))
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     monkeypatch.setattr(torch.jit, "load", lambda path, map_location: opened.append(map_location) or torch.nn.Identity())
-    for device in ("cpu", "cuda", None):
-        monkeypatch.setenv("GSAC_DEVICE", device) if device else monkeypatch.delenv("GSAC_DEVICE", raising=False)
-        open_network(tmp_path / "net.onnx", "mine")
-        open_brought(tmp_path / "net.pt2", "mine")
-    on_gpu = [list(PREFERRED), "cuda"]
-    assert [list(each) if not isinstance(each, str) else each for each in opened] == [[PREFERRED[-1]], "cpu", *on_gpu, *on_gpu]
+    for module in (cuda, keys):
+        monkeypatch.setattr(module, "why_not", lambda: None if gpu else "there is no GPU")
+    monkeypatch.setenv("GSAC_DEVICE", told) if told else monkeypatch.delenv("GSAC_DEVICE", raising=False)
+    open_network(tmp_path / "net.onnx", "mine")
+    open_brought(tmp_path / "net.pt2", "mine")
+    open_network(tmp_path / "net.onnx", "ours", threads=1)
+    assert opened == ([list(PREFERRED), "cuda"] if on_gpu else [[PREFERRED[-1]], "cpu"]) + [[PREFERRED[-1]]]
+    assert keys.device_class() == ("cuda" if on_gpu else "cpu")

@@ -33,6 +33,19 @@ def test_a_device_asked_for_and_the_same_device_found_share_one_result(parts):
     assert parts(gpu=True, device="cpu").key == parts(gpu=False).key
 
 
+@pytest.mark.parametrize("setting", [
+    "keypoints.detector=onnx-wholebody", "segment.method=sapiens", "face.method=deca", "smplx.start=mine"])
+def test_a_network_that_a_user_brings_makes_the_device_part_of_its_stages_key_alone(tmp_path, monkeypatch, setting):
+    project, name = Project.at_hand(), setting.partition(".")[0]
+    monkeypatch.delenv("GSAC_DEVICE", raising=False)
+    told = []
+    for gpu in (True, False):
+        monkeypatch.setattr(keys, "why_not", lambda gpu=gpu: None if gpu else "there is no GPU")
+        asked = [setting, "face.flame=mine"]
+        told += [Keys(project, resolve(project, None, words), Store(tmp_path)).device_of(name) for words in (asked, [])]
+    assert told == ["cuda", "", "cpu", ""]
+
+
 def test_cuda_without_a_gpu_is_refused_with_what_is_missing(parts, monkeypatch):
     with pytest.raises(BadInput, match="train.device is cuda, but there is no GPU.*train.device to auto"):
         parts(gpu=False, device="cuda")

@@ -80,7 +80,7 @@ STAGE = Stage(
     config=Config,
     packages=("toyware",) if "NAME" == "left" else (),
     models=lambda config: (config.model,) if config.model else (),
-    uses_device="NAME" == "right",
+    uses_device=lambda config: "NAME" == "right",
 )
 '''
 
