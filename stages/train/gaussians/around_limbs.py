@@ -7,7 +7,7 @@ import numpy as np
 from gsac.avatar.binding import Bound, FaceFrames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.joints import NAMES
+from gsac.avatar.joints import EYES, HEAD, JAW, NAMES
 from gsac.avatar.light import shade
 from gsac.stages.train.gaussians.merge import skin_weights
 from gsac.stages.train.gaussians.nearest import find_nearest
@@ -16,6 +16,10 @@ ALONG = 8.0
 """What a length along a limb counts, over one around it."""
 TURNED = 0.1
 """m that two faces are farther apart where their normals differ by 1: the chest's print does not come through to the back."""
+POLE = np.float32([0, 0.8, -0.6])
+"""Direction in which a head's pole lies, up and back."""
+HEAD_OFF = 10.0
+"""m that the head lies off the other limbs: hair has no part in a collar."""
 MANY = 100
 """Gaussians that a colour is mixed of."""
 CLOSE = 0.01
@@ -30,16 +34,22 @@ ARMS = [i for i, name in enumerate(NAMES) if any(part in name for part in (
 
 
 def stretch(bound: Bound, face: np.ndarray, frames: FaceFrames, body: Body) -> np.ndarray:
-    """(N, 6) m, places in which what lies around a limb is near, on the same side nearest. bound, frames: at rest; face: (N,)."""
-    arm = skin_weights(face, body)[:, ARMS].sum(1)
-    along = 1 + (ALONG - 1) * np.stack([arm, 1 - arm, np.zeros_like(arm)], 1)
-    return np.hstack([bound.means * along, TURNED * frames.R[face, :, 1]])
+    """(N, 7) m, places in which what lies around a limb is near, on the same side nearest. bound, frames: at rest; face: (N,).
+
+    Along a head is the way from its `POLE`: hair ends as far from it on all sides. It lies far from all other limbs.
+    """
+    skin = skin_weights(face, body)
+    arm, head = skin[:, ARMS].sum(1), skin[:, [HEAD, JAW, *EYES]].sum(1)
+    along = 1 + (ALONG - 1) * np.stack([arm, 1 - arm - head, np.zeros_like(arm)], 1)
+    pole = bound.means[np.argmax(bound.means @ POLE * (head > 0.5))]
+    from_pole = head * (HEAD_OFF + ALONG * np.linalg.norm(bound.means - pole, axis=1))
+    return np.hstack([bound.means * along, from_pole[:, None], TURNED * frames.R[face, :, 1]])
 
 
 def mix_colours(rgb: np.ndarray, weight: np.ndarray, places: np.ndarray, queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(M, 3) colours at queries (M, 6), in each channel the mean of the middle of those around, and (M, K) the indices of these.
+    """(M, 3) colours at queries (M, 7), in each channel the mean of the middle of those around, and (M, K) the indices of these.
 
-    rgb: (N, 3); weight: (N,) of each; places: (N, 6) of `stretch`.
+    rgb: (N, 3); weight: (N,) of each; places: (N, 7) of `stretch`.
     """
     near = find_nearest(places, queries, MANY)
     square = sum((places[near, axis] - queries[:, None, axis]) ** 2 for axis in range(places.shape[1]))

@@ -21,8 +21,8 @@ RING, COVER = 6, 0.45
 """Gaussians about one, and the share of the way to the last of them at which discs leave no gap."""
 BESIDE, FAR = 0.01, 0.03
 """m to the nearest seen gaussian, up to which colours go on as they are there, and from which on they are those around the limb."""
-APART = 5
-"""Standard deviations of an unseen gaussian that the nearest seen one lies away, at least, where it is widened."""
+APART = 3
+"""Standard deviations that a widened gaussian stays off all that lies less than FAR from a seen one: outlines do not fray."""
 
 
 def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
@@ -55,7 +55,7 @@ def covering_widths(means: np.ndarray, poor: np.ndarray, known: np.ndarray) -> n
     """
     spacing = np.linalg.norm(means[find_nearest(means, means[poor], RING + 1)[:, -1]] - means[poor], axis=1)
     away = np.linalg.norm(means[known[find_nearest(means[known], means[poor], 1)[:, 0]]] - means[poor], axis=1)
-    return np.maximum(np.minimum(COVER * spacing, away / APART), 1e-9)
+    return np.maximum(np.minimum(COVER * spacing, (away - FAR) / APART), 1e-9)
 
 
 def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, rest: np.ndarray, body: Body) -> np.ndarray:

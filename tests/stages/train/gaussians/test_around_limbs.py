@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from gsac.avatar.binding import face_frames
+from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
+from gsac.avatar.joints import HEAD
 from gsac.avatar.light import shade
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
-from gsac.stages.train.gaussians.around_limbs import middle_means
+from gsac.stages.train.gaussians.around_limbs import POLE, middle_means, stretch
+from gsac.stages.train.gaussians.merge import skin_weights
+from gsac.stages.train.gaussians.nearest import find_nearest
 from gsac.stages.train.gaussians.unseen import colour_unseen
 
 SHIRT, TROUSERS, PRINT, SLEEVE = np.float32([[0.8, 0.7, 0.2], [0.1, 0.1, 0.4], [0.0, 0.0, 0.0], [0.2, 0.6, 0.2]])
@@ -58,6 +61,20 @@ def test_a_print_on_the_chest_does_not_come_through_to_the_back(front):
     front.gaussians.rgb[:] = np.where((chest & front.seen)[:, None], PRINT, SHIRT)
     back = chest & (front.normals[:, 2] < -0.5)
     assert back.sum() > 20 and np.abs(front.colours()[back] - SHIRT).max() < 0.1
+
+
+def test_hair_goes_on_as_far_from_the_crown_behind_as_it_does_at_the_temples(front):
+    rest = face_frames(front.body.v_template, front.body.faces)
+    bound = bind(rest, front.gaussians.face, front.gaussians.mu, front.gaussians.quat, front.gaussians.log_scale)
+    places = stretch(bound, front.gaussians.face, rest, front.body)
+    weight = skin_weights(front.gaussians.face, front.body)[:, HEAD]
+    head = weight > 0.9
+    known, back = np.flatnonzero(front.seen), np.flatnonzero(head & (front.normals[:, 2] < -0.5))
+    crown = front.at[head][np.argmax(front.at[head] @ POLE)]
+    along = np.linalg.norm(front.at - crown, axis=1)
+    taken, beside = (known[find_nearest(where[known], where[back], 9)] for where in (places, front.at))
+    assert len(back) > 50 and (weight[taken] > 0.5).mean() > 0.98
+    assert 2 * np.median(np.abs(along[taken] - along[back, None])) < np.median(np.abs(along[beside] - along[back, None]))
 
 
 def test_what_was_seen_well_counts_more_than_what_was_seen_at_a_slant(front):

@@ -78,7 +78,7 @@ def test_unseen_discs_leave_no_gap_and_the_outline_of_what_is_seen_stays(body):
         vertices, camera = view(body)
         return render_bound(vertices, body.faces, which, camera, Workspace(1)).alpha
 
-    far = np.linalg.norm(at[~seen][:, None] - at[seen][None, ::7], axis=2).min(1) > 0.06
+    far = np.linalg.norm(at[~seen][:, None] - at[seen][None, ::7], axis=2).min(1) > 0.08
     trunk = np.flatnonzero(~seen)[far & (np.abs(at[~seen, 0]) < 0.1) & (at[~seen, 1] > 0)]
     back, camera = from_behind(body)
     x, y = camera.project(face_frames(back, body.faces).T[gaussians.face[trunk]].astype(np.float64)).astype(int).T
