@@ -52,7 +52,9 @@ def mix_colours(rgb: np.ndarray, weight: np.ndarray, places: np.ndarray, queries
     rgb: (N, 3); weight: (N,) of each; places: (N, 7) of `stretch`.
     """
     near = find_nearest(places, queries, MANY)
-    square = sum((places[near, axis] - queries[:, None, axis]) ** 2 for axis in range(places.shape[1]))
+    square = np.zeros(near.shape)
+    for axis in range(places.shape[1]):  # one at a time: all together they are 50 MB
+        square += (places[near, axis] - queries[:, None, axis]) ** 2
     counts = weight[near] * np.exp(-SPREAD * square / np.maximum(square[:, :1], CLOSE**2))
     counts /= np.maximum(counts.sum(1, keepdims=True), 1e-12)
     return np.stack([middle_means(rgb[near, channel], counts) for channel in range(3)], 1), near

@@ -17,7 +17,7 @@ from gsac.stages.train.gaussians.shown import find_evidence, find_place
 
 NEIGHBOURS = 8
 """Seen gaussians that an unseen one takes its height after, and its colour where they lie beside it."""
-RING, COVER = 6, 0.45
+RING, COVER = 6, 0.6
 """Gaussians about one, and the share of the way to the last of them at which discs leave no gap."""
 BESIDE, FAR = 0.01, 0.03
 """m to the nearest seen gaussian, up to which colours go on as they are there, and from which on they are those around the limb."""
