@@ -16,7 +16,7 @@ ALONG = 8.0
 """What a length along a limb counts, over one around it."""
 TURNED = 0.1
 """m that two faces are farther apart where their normals differ by 1: the chest's print does not come through to the back."""
-POLE = np.float32([0, 0.8, -0.6])
+POLE = np.array([0, 0.8, -0.6], np.float32)
 """Direction in which a head's pole lies, up and back."""
 HEAD_OFF = 10.0
 """m that the head lies off the other limbs: hair has no part in a collar."""
