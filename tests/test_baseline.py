@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 BASELINE = Path(__file__).resolve().parents[1] / ".basedpyright" / "baseline.json"
-MOST = 155
+MOST = 154
 """To be lowered with every finding that is mended, never raised."""
 
 
