@@ -8,6 +8,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.cloth_offsets import fold
 from gsac.stages.train.gaussians.detail import find_detail
+from gsac.stages.train.gaussians.facial_features import density_on_head
 from gsac.stages.train.gaussians.first_colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
 from gsac.stages.train.gaussians.joint_limits import density_where_grown
 from gsac.stages.train.task import Task
@@ -23,8 +24,8 @@ def crop_views(task: Task) -> dict[int, View]:
 
 
 def init_gaussians(task: Task, coarse: dict[int, View], count: int) -> Gaussians:
-    """`count` gaussians spread over the first frame's body by area, detail and growth, coloured from the frames; folds in the
-    surface's offset.
+    """`count` gaussians spread over the first frame's body by area, detail, growth and what people look at, coloured from the frames;
+    folds in the surface's offset.
 
     coarse: frame -> view at half the size.
     """
@@ -35,6 +36,7 @@ def init_gaussians(task: Task, coarse: dict[int, View], count: int) -> Gaussians
     frames = [PosedFrame(task.poses.vertices(int(t)), coarse[int(t)].camera, coarse[int(t)].pixels)
               for t in task.trained[::every]]
     density = find_detail(frames, rest, faces, task.config.seed) * density_where_grown(task.growth)
+    density *= density_on_head(task.poses.body, task.poses.betas)
     gaussians = Gaussians.area(rest, faces, count, task.config.seed, density=density)
     sights = read_sights(frames, faces, gaussians)
     places = centres_at_rest(gaussians, rest, faces)
