@@ -24,8 +24,8 @@ def crop_views(task: Task) -> dict[int, View]:
 
 
 def init_gaussians(task: Task, coarse: dict[int, View], count: int) -> Gaussians:
-    """`count` gaussians spread over the first frame's body by area, detail, growth and what people look at, coloured from the frames;
-    folds in the surface's offset.
+    """`count` gaussians spread over the first frame's body by area, detail, growth and facial features, coloured from the
+    frames; folds in the surface's offset.
 
     coarse: frame -> view at half the size.
     """
