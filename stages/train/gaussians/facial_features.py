@@ -12,7 +12,7 @@ MOVES = 0.003
 """m by which an expression moves a feature."""
 NEAR = 0.015
 """m about the features that are as dense; at twice that the density is that of the body."""
-DENSER = 4.0
+DENSER = 2.5
 """Density there, over that of the body."""
 
 
