@@ -205,7 +205,7 @@ def test_the_poses_equations_are_the_cpus_as_gaussians_surface_and_poses_move_an
             for (t, own), (_, same), (other, plain) in zip(found, again, expected, strict=True):
                 assert t == other and abs(own.pixels - plain.pixels) < 3
                 assert relative(own.gradient, plain.gradient) < 1e-3 and relative(own.hessian, plain.hessian) < 1e-3
-                assert own.error == pytest.approx(plain.error, rel=1e-4)
+                assert own.error == pytest.approx(plain.error, rel=1e-3)  # two pixels more or less count
                 for one, two in zip(own, same, strict=True):
                     np.testing.assert_array_equal(one, two)
             poses.pose += random.normal(0, 0.02, poses.pose.shape)
