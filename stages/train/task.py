@@ -14,7 +14,8 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.checkpoint import State
 from gsac.stages.train.config import TrainConfig
 from gsac.stages.train.gaussians.coarser import Coarser
-from gsac.stages.train.gaussians.joint_limits import find_growth
+from gsac.stages.train.gaussians.facial_features import density_on_head
+from gsac.stages.train.gaussians.joint_limits import density_where_grown, find_growth
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View
 
@@ -55,6 +56,11 @@ class Task:
     def growth(self) -> np.ndarray:
         """(F,) of `find_growth`, of the body as fitted."""
         return find_growth(self.poses, self.trained)
+
+    @cached_property
+    def density(self) -> np.ndarray:
+        """(F,) factors of the density of gaussians that the body asks for, as fitted: where joints bend, and on the head."""
+        return density_where_grown(self.growth) * density_on_head(self.poses.body, self.poses.betas)
 
 
 @dataclass

@@ -8,9 +8,7 @@ from gsac.avatar.binding import bind, face_frames
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.cloth_offsets import fold
 from gsac.stages.train.gaussians.detail import find_detail
-from gsac.stages.train.gaussians.facial_features import density_on_head
 from gsac.stages.train.gaussians.first_colours import PosedFrame, fill_unseen, find_light, mean_colours, read_sights
-from gsac.stages.train.gaussians.joint_limits import density_where_grown
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, of_each, person_crop
 
@@ -35,8 +33,7 @@ def init_gaussians(task: Task, coarse: dict[int, View], count: int) -> Gaussians
     every = -(-len(task.trained) // COLOUR_FRAMES)
     frames = [PosedFrame(task.poses.vertices(int(t)), coarse[int(t)].camera, coarse[int(t)].pixels)
               for t in task.trained[::every]]
-    density = find_detail(frames, rest, faces, task.config.seed) * density_where_grown(task.growth)
-    density *= density_on_head(task.poses.body, task.poses.betas)
+    density = find_detail(frames, rest, faces, task.config.seed) * task.density
     gaussians = Gaussians.area(rest, faces, count, task.config.seed, density=density)
     sights = read_sights(frames, faces, gaussians)
     places = centres_at_rest(gaussians, rest, faces)
