@@ -130,7 +130,7 @@ def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
     views = {t: person_crop(task.views[t]) for t in range(3)}
     poses = task.poses
     poses.transl[:, 0] -= TRUE_SHIFT
-    gaussians = init_gaussians(task, views, 800)
+    gaussians = init_gaussians(task, views, 900)
     right = half_error(gaussians, poses, 0, views[0], Workspace(1))
     poses.transl[0, 0] += TRUE_SHIFT
     poses.pose[0, 16, 2] += 0.2
