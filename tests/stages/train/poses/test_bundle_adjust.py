@@ -130,7 +130,7 @@ def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
     views = {t: person_crop(task.views[t]) for t in range(3)}
     poses = task.poses
     poses.transl[:, 0] -= TRUE_SHIFT
-    gaussians = init_gaussians(task, views, 900)
+    gaussians = init_gaussians(task, views, 2000)
     right = half_error(gaussians, poses, 0, views[0], Workspace(1))
     poses.transl[0, 0] += TRUE_SHIFT
     poses.pose[0, 16, 2] += 0.2
@@ -138,7 +138,7 @@ def test_a_frame_converges_to_its_own_image_and_the_others_stay(job):
     assert half_error(gaussians, poses, 0, views[0], Workspace(1)) > 1.3 * right
     photometric.converge(gaussians, poses, [0], task.views, rounds=8)
     assert half_error(gaussians, poses, 0, views[0], Workspace(1)) < right
-    assert abs(poses.transl[0, 0]) < 0.15 * TRUE_SHIFT and abs(poses.pose[0, 16, 2] - before.pose[0, 16, 2] + 0.2) < 0.07
+    assert abs(poses.transl[0, 0]) < 0.25 * TRUE_SHIFT and abs(poses.pose[0, 16, 2] - before.pose[0, 16, 2] + 0.2) < 0.07
     np.testing.assert_array_equal(poses.pose[1:], before.pose[1:])
     np.testing.assert_array_equal(poses.transl[1:], before.transl[1:])
 
