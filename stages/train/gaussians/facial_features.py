@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from gsac.avatar.body import Body
 from gsac.stages.train.gaussians.inner_faces import find_inner
+from gsac.stages.train.gaussians.nearest import find_nearest
 
 MOVES = 0.003
 """m by which an expression moves a feature."""
@@ -23,6 +23,6 @@ def density_on_head(body: Body, betas: np.ndarray) -> np.ndarray:
     moves = np.linalg.norm(body.exprdirs, axis=1).max(1, initial=0)[body.faces].mean(1)
     density = np.where(inner, 0.0, 1.0)
     if (features := ~inner & (moves > MOVES)).any():
-        away = KDTree(centres[features]).query(centres)[0]
+        away = np.linalg.norm(centres[features][find_nearest(centres[features], centres, 1)[:, 0]] - centres, axis=1)
         density *= 1 + (DENSER - 1) * np.clip(2 - away / NEAR, 0, 1)
     return density
