@@ -60,6 +60,8 @@ BLIND, MISSED = 12.0, 4.0
 """Cost of a hand that is seen where the body hides it, and of one in plain view that is not seen."""
 STILL, RESTS = 0.4, 4.0
 """Factor on the spread of an arm's speed, its robust limit, in spreads: who turns shows a resting arm from all sides."""
+QUICKEST, QUICKER = 8.0, 2.0
+"""rad/s, speed of shoulder or elbow beyond which a gesture is too quick to be one, and its spread."""
 
 SURE = 0.15
 """rad, spread of shoulder and elbow about where they are in a frame in which they are no doubt."""
@@ -154,8 +156,9 @@ class ArmPaths:
         angle = measure_turns(before[..., :2, :, :], after[..., :2, :, :])
         seconds = self.alone.seen.seconds
         assert seconds is not None  # without times no arm moves
-        gap = seconds[t] - seconds[t - 1]
-        return robust(angle / gap / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1)
+        speed = angle / (seconds[t] - seconds[t - 1])
+        quick = np.maximum(speed - QUICKEST, 0) / QUICKER
+        return robust(speed / (STILL * self.alone.speed_spread[1:3]), RESTS)[0].sum(-1) + (quick**2).sum(-1)
 
     def place(self, t: int, poses: np.ndarray) -> np.ndarray:
         """(K, 4, 3) m, shoulder, elbow, wrist and middle knuckle. poses: (K, 3, 3, 3) rotations of shoulder, elbow and wrist."""

@@ -133,17 +133,17 @@ def has_moved(arms: HiddenArms, problem: Problem, chain: Chain, side: int, first
     return bool(unknown and np.linalg.norm(after - before) > MOVED)
 
 
-def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None,
+def settle_doubtful(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None, rested: np.ndarray,
                     movable: bool) -> tuple[State, np.ndarray]:
     """The state with doubtful arms in poses that explain points and mask clearly better, where there are any; and (T, 2) bool, the
     doubtful arms that no stay has.
 
-    missing: (T, 2) bool, hands that were not detected; None: all were; movable: whether the pictures tell one pose of an arm from
-    another, else the arms stay as they are.
+    missing: (T, 2) bool, hands that were not detected; None: all were; rested: (T, 2) bool, arms at rest, which stay; movable:
+    whether the pictures tell one pose of an arm from another, else all arms stay as they are.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
     mirrored, calm = find_mirrored(arms, problem, state, missing)
-    loose = ~arms.mark_searched(len(missing))  # where a hand rests on the back was judged as paths are
+    loose = ~(arms.mark_searched(len(missing)) | rested)  # where an arm rests, or its hand on the back, was judged as paths are
     state = unmirror(arms, problem, state, mirrored & loose, calm, missing) if movable else state
     doubtful = find_contradicted(arms, problem, state, missing) | find_untold(arms, problem, state, missing)
     if movable:

@@ -21,7 +21,7 @@ from gsac.stages.findings import Code, Finding
 from gsac.stages.smplx.config import SmplxConfig
 from gsac.stages.smplx.detector_errors import Detector
 from gsac.stages.smplx.jacobians import make_pairs, place_points
-from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, measure_uncovered, move, settle_doubtful
+from gsac.stages.smplx.lm.doubtful_arms import find_contradicted, find_untold, measure_uncovered, move, settle_doubtful
 from gsac.stages.smplx.lm.ground import Ground
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, HiddenArms, widen_arm
 from gsac.stages.smplx.lm.hidden_search import search_hidden
@@ -29,6 +29,7 @@ from gsac.stages.smplx.lm.observations import observe, subtract_habit
 from gsac.stages.smplx.lm.outline_points import meet_outlines
 from gsac.stages.smplx.lm.person_offsets import PersonOffsets
 from gsac.stages.smplx.lm.problem import ROBUST, Problem, estimate_joint_sigma
+from gsac.stages.smplx.lm.resting_arms import rest_arms
 from gsac.stages.smplx.lm.shake import transl_acceleration
 from gsac.stages.smplx.lm.swapped_sides import DEARER, MARGIN, believe_by_faces, propose_by_faces, propose_swapped
 from gsac.stages.smplx.lm.turn_jumps import find_jumps, find_turned_over
@@ -65,9 +66,9 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
     detector = Detector.load(sightings.detector, body)
     sightings, problem, state, steps, said = fit_either_side(body, sightings, outlines, detector, config)
     hidden = HiddenArms.of(body, sightings.person_height)
-    moved = np.zeros((len(sightings.xy), 2), bool)
+    moved = rested = np.zeros((len(sightings.xy), 2), bool)
     if arms_told:
-        state, moved = move_contradicted(hidden, problem, state, sightings.missing)
+        state, moved, rested = move_contradicted(hidden, problem, state, sightings.missing)
     problem.outline_weight = config.silhouette
     if sightings.missing is not None and sightings.missing.any():
         hidden.find(problem, state, sightings.missing, find_followed(problem, state))
@@ -86,7 +87,7 @@ def fit_clip(body: Body, sightings: Sightings, outlines: list[Outline], config: 
         state, more = problem.minimise(state, config.iterations)
         steps += more
     cost = problem.cost(state)
-    state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing, movable=arms_told)
+    state, doubtful = settle_doubtful(hidden, problem, state, sightings.missing, rested, movable=arms_told)
     doubtful |= moved & ~hidden.mark(len(moved))
     state, more = fit_fingers(sightings, detector, problem, state, config)
     progress(config.rounds + 1, config.rounds + 1, "rounds")
@@ -184,21 +185,24 @@ def fit_points(problem: Problem, state: State, sightings: Sightings, detector: D
     return state, first + more
 
 
-def move_contradicted(arms: HiddenArms, problem: Problem, state: State, missing: np.ndarray | None) -> tuple[State, np.ndarray]:
-    """The state with arms that the pictures contradict where they clearly are, before they drag the trunk along; and (T, 2) bool,
-    those that moved, as quickly as a gesture from then on.
+def move_contradicted(arms: HiddenArms, problem: Problem, state: State,
+                      missing: np.ndarray | None) -> tuple[State, np.ndarray, np.ndarray]:
+    """The state with arms that the pictures contradict where they clearly are, before they drag the trunk along; (T, 2) bool,
+    those that moved, as quickly as a gesture from then on; and (T, 2) bool, those that rest.
 
     missing: (T, 2) bool, hands that were not detected; None: all were.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
-    moved = find_contradicted(arms, problem, state, missing)
+    doubtful = find_contradicted(arms, problem, state, missing) | find_untold(arms, problem, state, missing)
+    state, rested = rest_arms(arms, problem, state, doubtful, missing)
+    moved = find_contradicted(arms, problem, state, missing) & ~rested
     settled = move(arms, problem, state, moved, missing)
     moved &= (settled.local != state.local)[:, ARM_JOINTS].any((2, 3, 4))
     for side in (0, 1):
         arm = np.ix_(moved[:, side], np.isin(problem.active, ARM_JOINTS[side]))
         problem.loose[arm] = QUICK
         problem.spread[arm] *= FREE
-    return settled, moved
+    return settled, moved, rested
 
 
 def stand_on_ground(problem: Problem, state: State, sightings: Sightings, weight: float) -> None:

@@ -146,7 +146,7 @@ def put_inside_trunk(truth: State) -> State:
 def test_where_pictures_do_not_tell_poses_apart_an_arm_is_doubted_and_stays(hand_on_back):
     arms, problem, truth = hand_on_back
     state = put_inside_trunk(truth)
-    settled, doubtful = settle_doubtful(arms, problem, state, None, movable=False)
+    settled, doubtful = settle_doubtful(arms, problem, state, None, NONE, movable=False)
     assert doubtful[ON_BACK, 0].all() and settled is state
 
 
@@ -154,7 +154,7 @@ def test_a_hand_that_is_seen_on_the_back_and_fitted_inside_the_trunk_is_moved_to
     arms, problem, truth = hand_on_back
     state = put_inside_trunk(truth)
     with threadpool_limits(1, "blas"):
-        settled, doubtful = settle_doubtful(arms, problem, state, None, movable=True)
+        settled, doubtful = settle_doubtful(arms, problem, state, None, NONE, movable=True)
     wrist = [problem.skeleton.pose(s.local, s.shape).place[ON_BACK, INDEX["left_wrist"]] for s in (truth, state, settled)]
     before, after = (np.linalg.norm(other - wrist[0], axis=-1) for other in wrist[1:])
     assert doubtful[ON_BACK, 0].all() and not doubtful[:, 1].any()
@@ -165,7 +165,7 @@ def test_an_arm_that_was_found_to_rest_on_the_back_is_doubted_but_not_moved_agai
     arms, problem, truth = hand_on_back
     state = put_inside_trunk(truth)
     told = HiddenArms(arms.trunk, arms.forearm, arms.height, [Stay(0, 0, 1, 0, FRAMES, on_back=True)])
-    settled, doubtful = settle_doubtful(told, problem, state, None, movable=True)
+    settled, doubtful = settle_doubtful(told, problem, state, None, NONE, movable=True)
     assert doubtful[ON_BACK, 0].all() and np.array_equal(settled.local, state.local)
 
 
@@ -186,7 +186,7 @@ def test_an_arm_beside_its_points_in_one_frame_is_doubted_only_where_the_body_le
 
 
 def test_an_arm_as_the_pictures_show_it_keeps_still(hand_on_back):
-    state, doubtful = settle_doubtful(*hand_on_back, None, movable=True)
+    state, doubtful = settle_doubtful(*hand_on_back, None, NONE, movable=True)
     assert not doubtful.any() and np.array_equal(state.local, hand_on_back[2].local)
 
 

@@ -77,7 +77,7 @@ def test_an_arm_that_is_mirrored_along_the_view_for_some_frames_is_doubted_and_s
     side, arms, problem, truth = on_hip
     state = mirror(problem, truth, side)
     with threadpool_limits(1, "blas"):
-        settled, doubtful = settle_doubtful(arms, problem, state, None, movable=True)
+        settled, doubtful = settle_doubtful(arms, problem, state, None, NONE, movable=True)
     before, after = (np.linalg.norm(place_wrist(problem, own, side) - place_wrist(problem, truth, side), axis=-1)[MIRRORED]
                      for own in (state, settled))
     assert before.max() > 0.25 and np.flatnonzero(doubtful[:, side]).tolist() == np.flatnonzero(MIRRORED).tolist()
