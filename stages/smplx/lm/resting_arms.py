@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from gsac.avatar import rotation
-from gsac.stages.smplx.lm.arm_paths import FINER, MOVE, MOVES, ArmPaths, list_poses
+from gsac.stages.smplx.lm.arm_paths import FINER, MOVE, MOVES, ArmPaths, list_poses, measure_turns
 from gsac.stages.smplx.lm.doubtful_arms import hold
-from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, STILL, HiddenArms, Stay, isolate_arm, isolate_state
+from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, FREE, QUICK, STILL, HiddenArms, Stay, isolate_arm, isolate_state
 from gsac.stages.smplx.lm.problem import Problem
 from gsac.stages.smplx.state import State
 
@@ -29,11 +29,13 @@ WEIGHED = 300
 """Poses, the best by points and mask, that are weighed against the body."""
 SEARCHES, STEPS = 2, 8
 """Searches, and steps after each in which all but the resting arms moves."""
+GOES = 0.5
+"""rad, turn of shoulder or elbow from frame to frame from which on the arm goes from one rest to another."""
 
 
 def rest_arms(arms: HiddenArms, problem: Problem, state: State, asked: np.ndarray, missing: np.ndarray) -> tuple[State, np.ndarray]:
     """The state with arms at rest where that is cheaper, and (T, 2) bool, those arms, which the problem holds nearly still from now
-    on. One arm that is asked for asks for both: each hides the other.
+    on, but where it goes. One arm that is asked for asks for both: each hides the other.
 
     asked: (T, 2) bool, doubtful arms; missing: (T, 2) bool, hands that were not detected. Photos, and clips without masks, stay.
     """
@@ -50,10 +52,12 @@ def rest_arms(arms: HiddenArms, problem: Problem, state: State, asked: np.ndarra
         still = np.isin(problem.active, ARM_JOINTS[rested.any(0), 1:])
         held = np.concatenate([np.repeat(still, 3), np.zeros(problem.size - 3 * len(still), bool)])
         state, _ = problem.minimise(state, STEPS, held, np.ones(state.shared, bool))
-    for side in (0, 1):
-        arm = np.ix_(rested[:, side], np.isin(problem.active, ARM_JOINTS[side]))
-        problem.loose[arm] = STILL
-        problem.spread[arm] *= FREE
+    for side in np.flatnonzero(rested.any(0)).tolist():
+        arm, pose = np.isin(problem.active, ARM_JOINTS[side]), state.local[:, ARM_JOINTS[side, 1:3]]
+        leaves = measure_turns(pose[:-1], pose[1:]).max(1) > GOES
+        problem.loose[np.ix_(rested[:, side], arm)] = STILL
+        problem.loose[np.ix_(np.append(leaves, False) | np.insert(leaves, 0, False), arm)] = QUICK
+        problem.spread[np.ix_(rested[:, side], arm)] *= FREE
     return state, rested
 
 
