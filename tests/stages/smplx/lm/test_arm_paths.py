@@ -144,7 +144,8 @@ def test_only_arms_that_rest_or_move_before_the_rounds_are_still_or_free_from_th
     assert not (moved | rested).any() and np.array_equal(state.local, truth.local) and np.array_equal(problem.loose, loose)
     state, moved, rested = move_contradicted(arms, problem, hang(truth), None)
     assert (moved | rested)[BENT, 0].all() and not (moved | rested)[:, 1].any() and not (moved & rested).any()
-    freer = (problem.spread > spread).any(2)
-    for arm, changed in ((moved, problem.loose > loose), (rested, problem.loose < loose), (moved | rested, freer)):
-        assert np.array_equal(changed.any(1), arm[:, 0]) and set(BODY_JOINTS[changed.any(0)]) <= {*ARM_JOINTS[0]}
+    slower, quicker, wider = problem.loose < loose, problem.loose > loose, (problem.spread > spread).any(2)
+    assert np.array_equal(wider.any(1), (moved | rested)[:, 0]) and (slower | quicker).any(1)[BENT].all()
+    assert not slower.any(1)[~rested[:, 0]].any() and quicker.any(1)[moved[:, 0]].all()
+    assert {*BODY_JOINTS[(slower | quicker | wider).any(0)]} <= {*ARM_JOINTS[0]}
     problem.loose[:], problem.spread[:] = loose, spread
