@@ -1,4 +1,4 @@
-"""Arms that rest while a person turns, where their points mislead: a hand in the hair, a phone at the ear, folded arms.
+"""Arms that rest while a person turns, where their points mislead: a hand in the hair, a phone before the chest, folded arms.
 
 Frame by frame several poses explain the points of an arm that trunk or head hide by half, and a fit that begins with an arm that
 hangs finds one that lies between. The pose that explains most frames is told by all of them together, and so is a second one, from
