@@ -4,7 +4,7 @@ Frame by frame several poses explain the points of an arm that trunk or head hid
 hangs finds one that lies between. The pose that explains most frames is told by all of them together, and so is a second one, from
 which the arm came or to which it goes. They are taken where that is cheaper, motion counted; then the trunk, which the arm had
 dragged along, follows, and both are looked for once more.
-T frames, K poses; sides are 0 left, 1 right.
+T frames; sides are 0 left, 1 right.
 """
 
 from __future__ import annotations
