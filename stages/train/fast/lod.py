@@ -19,12 +19,10 @@ from gsac.avatar.threads import prefetch
 from gsac.stages.train.fast.backend import Backend
 from gsac.stages.train.fast.drawn_height import find_drawn_height, typical_height
 from gsac.stages.train.fast.initial_gaussians import crop_views
+from gsac.stages.train.fast.merged import merge_trainer
 from gsac.stages.train.fast.refit import FIRM, GENTLE
-from gsac.stages.train.fast.size_search import POSE_ROUNDS, count_pixels, viewing_weight
-from gsac.stages.train.fast.trainer import Trainer
-from gsac.stages.train.gaussians.heights import level_heights
+from gsac.stages.train.fast.size_search import POSE_ROUNDS
 from gsac.stages.train.gaussians.joint_cuts import uncut
-from gsac.stages.train.gaussians.merge import merge_to_size
 from gsac.stages.train.judge.heldout import Candidate, judge_all
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
@@ -56,7 +54,6 @@ def fit_levels(task: Task, backend: Backend, fit: Fit, finish: Callable[[Gaussia
 
     finish: a level as it is handed out, from the gaussians as they were fitted; hand_out: called with each when it is done.
     """
-    rest, body = task.poses.rest(int(task.trained[0]))[0], task.poses.body
     filmed = crop_views(task)
     tall = typical_height(task.poses, filmed)
     finer, finer_seen = fit.gaussians, fit.seen
@@ -71,10 +68,7 @@ def fit_levels(task: Task, backend: Backend, fit: Fit, finish: Callable[[Gaussia
         for level, scale, views in zip(levels, scales, prefetch(ahead, partial(scale_views, filmed), scales, 1), strict=True):
             size = min(uncut(level.most), round(FEWER * len(finer)))
             tried, seen = min((one for one in ((finer, finer_seen), *smaller) if len(one[0]) >= size), key=lambda one: len(one[0]))
-            worth = count_pixels(tried, task, views) * viewing_weight(tried, body)
-            fewer, seen = merge_to_size(tried, seen, worth, size, body, rest)
-            trainer = Trainer(level_heights(fewer, rest, body.faces), task, frozen_body=True, scale=scale)
-            trainer.seen = seen
+            trainer = merge_trainer(tried, seen, size, task, views, scale)
             pace = FIRM if len(tried) >= 2 * size else GENTLE
             gaussians, seen = backend.refit(task, trainer, views, pace).finish(views)
             placed, finished = aside.submit(move, gaussians, task, looked_at), aside.submit(finish, gaussians)

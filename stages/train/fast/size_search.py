@@ -10,35 +10,21 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 
-import numpy as np
-
-from gsac.avatar.body import Body
-from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.joints import HEAD, JAW, WRISTS, J
 from gsac.avatar.metrics import psnr
-from gsac.avatar.raster import render_bound
-from gsac.avatar.threads import Workspace, side_by_side
 from gsac.stages.train.fast.backend import Backend, Trained
-from gsac.stages.train.fast.initial_gaussians import COLOUR_FRAMES
+from gsac.stages.train.fast.merged import merge_trainer
 from gsac.stages.train.fast.refit import OF_SIZE
 from gsac.stages.train.fast.schedule import budget
 from gsac.stages.train.fast.size_rule import MOST_LOST, SizeScore, choose, optimism
-from gsac.stages.train.fast.trainer import Trainer
-from gsac.stages.train.gaussians.added_alpha import added_alpha
-from gsac.stages.train.gaussians.heights import level_heights
-from gsac.stages.train.gaussians.merge import merge_to_size, skin_weights
 from gsac.stages.train.judge.heldout import Candidate, judge_person
 from gsac.stages.train.poses.photometric import converge
 from gsac.stages.train.poses.poses import Poses, carry_to_untrained
 from gsac.stages.train.task import Fit, Task
-from gsac.stages.train.views import View
 
 SHARES = 1, 2 / 3, 1 / 2, 1 / 3, 1 / 4, 1 / 6, 1 / 12
 """Sizes, of the largest; the largest is taken where no frame can judge."""
 POSE_ROUNDS = 5
 """Rounds that move the held-out frames' poses, on any device: the choice shall not depend on it."""
-NEAR_JOINTS, NEAR_WEIGHT = [HEAD, *WRISTS, *range(JAW, J)], 3.0
-"""Joints of head and hands, and the weight of a pixel there over one elsewhere."""
 
 
 def search(task: Task, backend: Backend) -> Fit:
@@ -75,11 +61,7 @@ def refit_fewer(trained: Trained, size: int, task: Task, backend: Backend) -> Tr
     """What was trained, merged to `size` gaussians and refitted to the same views."""
     trainer, fine, coarse = trained
     assert trainer.seen is not None  # as `Backend.train` and `refit` leave it
-    gaussians = trainer.gaussians()
-    worth = count_pixels(gaussians, task, coarse) * viewing_weight(gaussians, task.poses.body)
-    fewer, seen = merge_to_size(gaussians, trainer.seen, worth, size, task.poses.body, trainer.rest)
-    merged = Trainer(level_heights(fewer, trainer.rest, trainer.faces), task, frozen_body=True)
-    merged.seen = seen
+    merged = merge_trainer(trainer.gaussians(), trainer.seen, size, task, coarse)
     return trained._replace(trainer=backend.refit(task, merged, fine, OF_SIZE, coarse))
 
 
@@ -101,17 +83,3 @@ def judge_size(trained: Trained, size: int, task: Task, poses: Poses) -> tuple[F
 def list_sizes(largest: int) -> list[int]:
     """Numbers of gaussians to try, largest first."""
     return [round(share * largest) for share in SHARES]
-
-
-def count_pixels(gaussians: Gaussians, task: Task, views: dict[int, View]) -> np.ndarray:
-    """(N,) pixels that each gaussian adds to some of the trained frames."""
-
-    def added(t: int, workspace: Workspace) -> np.ndarray:
-        return added_alpha(render_bound(task.poses.vertices(t), task.poses.body.faces, gaussians, views[t].camera, workspace))
-
-    return sum(side_by_side(added, map(int, task.trained[::-(-len(task.trained) // COLOUR_FRAMES)])), np.zeros(len(gaussians)))
-
-
-def viewing_weight(gaussians: Gaussians, body: Body) -> np.ndarray:
-    """(N,) weight of a gaussian's pixels, 1..NEAR_WEIGHT: viewers come closer to head and hands than the clip does."""
-    return 1 + (NEAR_WEIGHT - 1) * skin_weights(gaussians.face, body)[:, NEAR_JOINTS].sum(1)

@@ -19,10 +19,15 @@ NEIGHBOURS = 8
 """Seen gaussians that an unseen one takes its height after, and its colour where they lie beside it."""
 RING, COVER = 6, 0.6
 """Gaussians about one, and the share of the way to the last of them at which discs leave no gap."""
+EDGE = 2.5
+"""Standard deviations at which a widened disc ends: there it meets the surface, below which its middle lies."""
+PLACE, APART = 24, 0.004
+"""Gaussians that tell how the surface bends at a place, and m between two from which on they tell it."""
+SLIMMEST, WIDEST = 0.005, 0.15
+"""m, the radii of a finger and of a flat back."""
 BESIDE, FAR = 0.01, 0.03
-"""m to the nearest seen gaussian, up to which colours go on as they are there, and from which on they are those around the limb."""
-APART = 3
-"""Standard deviations that a widened gaussian stays off all that lies less than FAR from a seen one: outlines do not fray."""
+"""m to the nearest seen gaussian: up to the first, colours and widths go on as they are there, since wide discs would fray an
+outline; from the second on colours are those around the limb, and discs cover."""
 
 
 def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
@@ -39,23 +44,59 @@ def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, fac
     out = gaussians[np.arange(len(gaussians))]
     height = np.median(size[near] * gaussians.mu[near, 1], axis=1) / size[poor]
     out.mu[poor, 1] = np.minimum(gaussians.mu[poor, 1], height)
-    means = bind(frames, out.face, out.mu, out.quat, out.log_scale).means
-    widths = np.sort(gaussians.log_scale, 1)[:, 1:].mean(1) + np.log(size)
-    width = np.minimum(np.median(widths[near], axis=1), widths[poor])
-    width = np.maximum(width, np.log(covering_widths(means, poor, known))) - np.log(size[poor])
-    out.log_scale[poor] = np.stack([width, width + np.log(FLATNESS), width], 1)
-    out.quat[poor] = [1, 0, 0, 0]
+    widths = disc_widths(gaussians, size)
+    lay_discs(out, poor, np.minimum(np.median(widths[near], axis=1), widths[poor]) / size[poor])
+    return cover_unseen(out, seen, rest, faces)
+
+
+def cover_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
+    """The gaussians, those far from all that is seen as discs that leave no gap: what lies behind a limb shines through none.
+
+    A wide disc would stand off a round limb. So it sinks, until its edge meets the surface. seen: (N,) bool; rest: (V, 3) m;
+    faces: (F, 3).
+    """
+    poor, known = np.flatnonzero(~seen), np.flatnonzero(seen)
+    if not len(poor) or not len(known):
+        return gaussians
+    frames = face_frames(rest, faces)
+    size = np.maximum(frames.k[gaussians.face], 1e-9)
+    means = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means
+    spacing = np.linalg.norm(means[find_nearest(means, means[poor], RING + 1)[:, -1]] - means[poor], axis=1)
+    away = np.linalg.norm(means[known[find_nearest(means[known], means[poor], 1)[:, 0]]] - means[poor], axis=1)
+    radius = find_radii(frames.T[gaussians.face], frames.R[gaussians.face, :, 1], poor)
+    width, own = far_share(away) * np.minimum(COVER * spacing, radius / EDGE), disc_widths(gaussians, size)[poor]
+    wider = width > own
+    poor, width, own, radius = poor[wider], width[wider], own[wider], radius[wider]
+    out = gaussians[np.arange(len(gaussians))]
+    out.mu[poor, 1] -= EDGE**2 * (width**2 - own**2) / (2 * radius) / size[poor]
+    lay_discs(out, poor, width / size[poor])
     return out
 
 
-def covering_widths(means: np.ndarray, poor: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """(M,) m, standard deviations at which gaussians leave no gap between them, less near seen ones: an outline stays as it is.
+def disc_widths(gaussians: Gaussians, size: np.ndarray) -> np.ndarray:
+    """(N,) m, mean of each one's two largest standard deviations. size: (N,) m, `FaceFrames.k` of their faces."""
+    return np.exp(np.sort(gaussians.log_scale, 1)[:, 1:].mean(1)) * size
 
-    means: (N, 3) m at rest; poor: (M,) the unseen; known: (K,) the seen.
-    """
-    spacing = np.linalg.norm(means[find_nearest(means, means[poor], RING + 1)[:, -1]] - means[poor], axis=1)
-    away = np.linalg.norm(means[known[find_nearest(means[known], means[poor], 1)[:, 0]]] - means[poor], axis=1)
-    return np.maximum(np.minimum(COVER * spacing, (away - FAR) / APART), 1e-9)
+
+def lay_discs(gaussians: Gaussians, which: np.ndarray, width: np.ndarray) -> None:
+    """Makes some, (M,) indices, flat discs on their faces, in place. width: (M,) standard deviation in units of the face."""
+    width = np.log(width)
+    gaussians.log_scale[which] = np.stack([width, width + np.log(FLATNESS), width], 1)
+    gaussians.quat[which] = [1, 0, 0, 0]
+
+
+def find_radii(places: np.ndarray, normals: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """(M,) m, radius of the surface where it bends most. places: (N, 3) m; normals: (N, 3) unit; which: (M,) of these."""
+    near = find_nearest(places, places[which], PLACE)
+    apart = np.linalg.norm(places[near] - places[which, None], axis=2)
+    turned = np.linalg.norm(normals[near] - normals[which, None], axis=2)
+    bends = np.where(apart > APART, turned / np.maximum(apart, APART), 0)
+    return 1 / np.clip(bends.max(1), 1 / WIDEST, 1 / SLIMMEST)
+
+
+def far_share(away: np.ndarray) -> np.ndarray:
+    """(N,) from 0 beside what is seen to 1 far from it. away: (N,) m to the nearest seen gaussian."""
+    return np.clip((away - BESIDE) / (FAR - BESIDE), 0, 1)
 
 
 def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, rest: np.ndarray, body: Body) -> np.ndarray:
@@ -74,7 +115,7 @@ def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, re
     out.rgb[poor] = hold_colours(out, poor, beside, frames.R[:, :, 1])
     away = np.linalg.norm(bound.means[beside[:, 0]] - bound.means[poor], axis=1)
     far = away > BESIDE
-    share = np.minimum((away[far] - BESIDE) / (FAR - BESIDE), 1)[:, None]
+    share = far_share(away[far])[:, None]
     around = colour_far(gaussians, bound, pixels, seen, poor[far], frames, body)
     out.rgb[poor[far]] += share * (around - out.rgb[poor[far]])
     return out.rgb
