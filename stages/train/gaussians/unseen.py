@@ -19,7 +19,7 @@ NEIGHBOURS = 8
 """Seen gaussians that an unseen one takes its height after, and its colour where they lie beside it."""
 RING, COVER = 6, 0.6
 """Gaussians about one, and the share of the way to the last of them at which discs leave no gap."""
-EDGE = 2.5
+EDGE = 3
 """Standard deviations at which a widened disc ends: there it meets the surface, below which its middle lies."""
 PLACE, APART = 24, 0.004
 """Gaussians that tell how the surface bends at a place, and m between two from which on they tell it."""
@@ -79,7 +79,7 @@ def disc_widths(gaussians: Gaussians, size: np.ndarray) -> np.ndarray:
 
 
 def lay_discs(gaussians: Gaussians, which: np.ndarray, width: np.ndarray) -> None:
-    """Makes some, (M,) indices, flat discs on their faces, in place. width: (M,) standard deviation in units of the face."""
+    """Makes some flat discs on their faces, in place. which: (M,) indices; width: (M,) standard deviation in units of the face."""
     width = np.log(width)
     gaussians.log_scale[which] = np.stack([width, width + np.log(FLATNESS), width], 1)
     gaussians.quat[which] = [1, 0, 0, 0]

@@ -13,6 +13,7 @@ from gsac.avatar.raster import render_bound
 from gsac.avatar.threads import Workspace
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
 from gsac.stages.train.gaussians import heights, shown, unseen
+from gsac.stages.train.gaussians.merge import merge_to_size
 from gsac.stages.train.judge import heldout, novel_poses
 from gsac.stages.train.poses.poses import Poses
 
@@ -88,6 +89,28 @@ def test_unseen_discs_leave_no_gap_and_the_outline_of_what_is_seen_stays(body):
     for view in (standing, from_behind):
         were, are = alpha(gaussians, view), alpha(out, view)
         assert are[were < 0.004].sum() < 5e-4 * were.sum()
+
+
+def test_what_merging_opened_is_covered_anew_within_the_outline(body):
+    gaussians, at = covering(body)
+    normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
+    seen = normal[:, 2] > -0.2
+    gaussians.opacity[:] = 0.95
+    merged, still = merge_to_size(gaussians, seen, np.where(seen, 10.0, 0.0), 2200, body, body.v_template)
+    covered = unseen.cover_unseen(merged, still, body.v_template, body.faces)
+    back, camera = from_behind(body)
+    trunk = np.flatnonzero((normal[:, 2] < -0.9) & (np.abs(at[:, 0]) < 0.1) & (at[:, 1] > 0))
+    x, y = camera.project(face_frames(back, body.faces).T[gaussians.face[trunk]].astype(np.float64)).astype(int).T
+
+    def shine_through(which):
+        hidden = replace(which, opacity=np.where(still, 1e-4, which.opacity))
+        return 1 - render_bound(back, body.faces, hidden, camera, Workspace(1)).alpha[y, x].mean()
+
+    assert (~still).sum() < 0.4 * (~seen).sum() and shine_through(merged) > 0.15
+    assert shine_through(covered) < 0.5 * shine_through(merged)
+    front, camera = standing(body)
+    were, are = (render_bound(front, body.faces, which, camera, Workspace(1)).alpha for which in (merged, covered))
+    assert are[were < 0.004].sum() < 5e-4 * were.sum()
 
 
 def test_where_nothing_or_everything_is_seen_nothing_changes(body):
