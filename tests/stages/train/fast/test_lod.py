@@ -39,8 +39,8 @@ def test_a_level_is_drawn_up_to_where_it_is_as_good_as_more_gaussians(job_anywhe
 
 @pytest.mark.slow
 def test_a_size_that_was_tried_and_not_taken_is_where_a_level_begins(job_anywhere, monkeypatch):
-    merge, begun = lod.merge_to_size, []
-    monkeypatch.setattr(lod, "merge_to_size", lambda gaussians, *args: (begun.append(len(gaussians)), merge(gaussians, *args))[1])
+    merge, begun = lod.merge_trainer, []
+    monkeypatch.setattr(lod, "merge_trainer", lambda gaussians, *args: (begun.append(len(gaussians)), merge(gaussians, *args))[1])
     monkeypatch.setattr(lod, "LEVELS", SMALL_LEVELS)
     monkeypatch.setattr(size_search, "list_sizes", lambda largest: (900, 620, 30))
     monkeypatch.setattr(size_search, "choose", lambda scores: scores[0])
