@@ -1,7 +1,8 @@
 """Merges neighbouring gaussians of similar colour, pair by pair, to fewer that look alike.
 
 A pair's cost is the difference of colours it loses (Ward's criterion, weighted by the pixels that each shows) plus its distance.
-No gaussian is dropped: a merged one covers the area of both, so that parts no frame shows stay covered.
+No gaussian is dropped, and a merged one covers the area of both as far as its opacity goes. Gaps that open all the same are closed
+by training where frames show them, elsewhere by `unseen.cover_unseen`.
 
 The result is trained further. `stages/export/levels.py` merges by place alone, for avatars that were trained without levels: it has
 neither frames to weigh colours with nor training afterwards.
