@@ -170,6 +170,11 @@ class Body:
         return replace(self, shapedirs=np.ascontiguousarray(self.shapedirs[:, :, :betas]))
 
     @property
+    def has_actions(self) -> bool:
+        """Whether expressions are facial actions, each from 0 to 1, the jaw's among them; others are components without limits."""
+        return bool(self.jaw_actions.any())
+
+    @property
     def num_figure(self) -> int:
         """How many betas shape the person; those after them are the clothes."""
         return self.num_betas - len(self.clothes)

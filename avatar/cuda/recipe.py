@@ -11,7 +11,7 @@ import numpy as np
 from gsac.avatar.cuda.structs import MOST_BATCH, PLAN
 
 FROM_CONFIG = ("seed", "mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "pose_pull",
-               "expression_rate", "joint_rate", "ssim", "sobel", "mask", "needle", "reach", "place_pull")
+               "joint_rate", "ssim", "sobel", "mask", "needle", "reach", "place_pull")
 """Fields of a recipe that a configuration has by the same name."""
 
 

@@ -162,6 +162,10 @@ class CudaTrainer:
             if name in self.buffers:
                 self.buffers[name].fill(0)
 
+    def wear(self, rest: np.ndarray) -> None:
+        """Sets the frames' vertices at rest, in other expressions. rest: (R, V, 3) m, of as many shapes as the body came with."""
+        self.buffers["rest"].write(np.asarray(rest, np.float32))
+
     def replace(self, gaussians: Gaussians, resting: np.ndarray | None = None, reach: float | None = None) -> None:
         """Sets the gaussians to go on from; the body's displacement, which the caller has folded into them, becomes zero.
 

@@ -10,6 +10,7 @@ import numpy as np
 from gsac.avatar.artifacts import Clip, frame_paths, write_arrays
 from gsac.avatar.facemesh import POINTS
 from gsac.avatar.frame_files import read_frame
+from gsac.avatar.resting_face import find_resting_face
 from gsac.avatar.threads import available_cores
 from gsac.avatar.wholebody import FACE, INDEX
 from gsac.stages.contract import Job
@@ -19,7 +20,6 @@ from gsac.stages.face.deca import EXPRESSION, JAW, SHAPE, DecaEncoder
 from gsac.stages.face.flame import FlameHead
 from gsac.stages.face.head import HeadModel
 from gsac.stages.face.landmarks import TwoMeshes, align, read_averaged
-from gsac.stages.face.resting_face import find_resting_face
 from gsac.stages.findings import Code, Finding
 from gsac.stages.missing_frames import read_keypoints
 
@@ -52,7 +52,7 @@ def run(job: Job) -> None:
     expression = fill_unseen(c, valid, times, config.rest_time)
     seen_only = {}
     if valid.any():
-        rest = find_resting_face(c, direction[valid])
+        rest = find_resting_face(c, direction[valid][:, 2])
         head = fit_head(actions, flame, own, expression)
         if flame and config.method == "deca":
             head = encode_head(flame, DecaEncoder(job.models[ENCODER]), paths, landmarks, times, config.rest_time)

@@ -15,7 +15,7 @@ JAW_OPEN, JAW_ANGLE = 24, 0.38
 
 def acts_actions(body: Body, face: dict[str, np.ndarray]) -> bool:
     """Whether the body's expressions are the facial actions of face.npz, (T, 52) and more arrays, as the open body's are."""
-    return face["expression"].shape[1] == len(body.expression_names) and bool(body.jaw_actions.any())
+    return face["expression"].shape[1] == len(body.expression_names) and body.has_actions
 
 
 def translate_rest(body: Body, face: dict[str, np.ndarray]) -> np.ndarray | None:

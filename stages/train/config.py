@@ -110,8 +110,6 @@ class TrainConfig:
     late steps go by the frame's Hessian instead, but for the hands (fast). 0: no step moves a pose."""
     pose_pull: float = 1e-4
     """Weight of the squared distance of a refined pose from its start, in units of 0.05 rad and 2 cm."""
-    expression_rate: float = 0.0
-    """Adam rate of each frame's expression (fast), falls to a hundredth; pulled to the fit's like poses, in units of 0.3."""
     joint_rate: float = 0.0
     """Adam rate of the joints at rest, m, shared by all frames (fast), falls to a hundredth; pulled likewise, in units of 1 cm."""
     light: bool = True
@@ -188,8 +186,7 @@ class TrainConfig:
             read_numbers(self.heldout_frames)
         if self.holdout == 1:
             raise BadInput("train.holdout is 1: every frame would be held out; use 0 for none, or 2 and more")
-        for name in ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "expression_rate",
-                     "joint_rate", "pose_pull", "ssim",
-                     "sobel", "mask", "largest", "reach", "place_pull"):
+        for name in ("mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacity_rate", "pose_rate", "joint_rate",
+                     "pose_pull", "ssim", "sobel", "mask", "largest", "reach", "place_pull"):
             if not 0 <= getattr(self, name) < 1e3:
                 raise BadInput(f"train.{name} is {getattr(self, name)}; it must be 0 or more")

@@ -50,27 +50,26 @@ def open_trainer(kind: type[Kind], poses: Poses, frames: np.ndarray, levels: lis
 
 
 def body_arrays(poses: Poses, frames: np.ndarray, recipe: Recipe) -> BodyArrays:
-    """The body for frames, (n,) indices: each rest shape once, the first frame's first, with what the recipe learns of it.
-
-    Pose correctives are part of the rest shape, those of each frame's pose as training starts.
-    """
-    body, rests, rest_of, known = poses.body, [], [], {}
-    for t in frames:
-        vertices, joints = poses.rest(int(t))
-        vertices = body.correct(vertices + poses.offset, poses.pose[t])
-        at = known.setdefault(vertices.tobytes(), len(rests))
-        if at == len(rests):
-            rests.append(vertices)
-        rest_of.append(at)
+    """The body for frames, (n,) indices, with what the recipe learns of it."""
+    body = poses.body
+    joints = poses.rest(int(frames[0]))[1]
     expression = body.exprdirs if recipe.expression_rate else None
     if isinstance(recipe, PaperRecipe):  # a jaw without skin opens the mouth by expressions: its turn is three more of them
         expression = np.concatenate([body.exprdirs, body.exprdirs @ body.jaw_actions], 2)
-    arrays = BodyArrays(np.stack(rests), np.array(rest_of), joints, np.asarray(body.parents), body.skin_index, body.skin_weight,
-                        np.asarray(body.faces), expression=expression)
+    arrays = BodyArrays(rest_shapes(poses, frames, poses.offset), np.arange(len(frames)), joints, np.asarray(body.parents),
+                        body.skin_index, body.skin_weight, np.asarray(body.faces), expression=expression)
     if not recipe.beta_rate:
         return arrays
     shape = body.shapedirs[:, :, :len(poses.betas)]
     return arrays._replace(shape=shape, joint_shape=np.tensordot(body.J_regressor, shape, 1))
+
+
+def rest_shapes(poses: Poses, frames: np.ndarray, offset: np.ndarray) -> np.ndarray:
+    """(n, V, 3) m, vertices at rest of frames, (n,) indices, in their expressions. offset: (V, 3) m, of the surface.
+
+    Pose correctives are part of them, those of each frame's pose as it stands.
+    """
+    return np.stack([poses.body.correct(poses.rest(int(t))[0] + offset, poses.pose[t]) for t in frames])
 
 
 def train_until(trainer: CudaTrainer, task: Task, until: int) -> None:

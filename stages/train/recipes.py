@@ -18,6 +18,7 @@ from gsac.stages.train.gaussians.coarser import Coarser
 from gsac.stages.train.gaussians.specks import find_specks
 from gsac.stages.train.paper import cuda as paper_cuda
 from gsac.stages.train.paper import trainer as paper
+from gsac.stages.train.poses.expressions import find_rest
 from gsac.stages.train.task import Fit, Task
 
 
@@ -30,6 +31,7 @@ def fit_fast(backend: Backend, task: Task) -> Fit:
         prealign.adjust(task, backend)
     fit = size_search.search(task, backend) if task.config.searches_size() else backend.fit(task, budget(task, backend.device))
     require_finite("after the last step", named_values(fit.gaussians))
+    task.poses.rest_expression = find_rest(task.poses, task.trained)
     kept = ~find_specks(fit.gaussians, task.poses, {int(t): task.views[t] for t in task.trained})
     fit = replace(fit, gaussians=fit.gaussians[kept], seen=fit.seen[kept])
     with_drift = replace(task, poses=task.poses.copy())

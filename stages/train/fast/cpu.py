@@ -20,6 +20,7 @@ from gsac.stages.train.fast.trainer import AT_ONCE, Step, Trainer
 from gsac.stages.train.gaussians.mean_of_steps import MeanOfSteps
 from gsac.stages.train.judge.heldout import align_pose
 from gsac.stages.train.poses.bundle_adjust import Equations, FrameEquations, correct_midway
+from gsac.stages.train.poses.expressions import correct_expressions
 from gsac.stages.train.poses.own_errors import correct_each, newton_steps
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.task import Task
@@ -102,13 +103,14 @@ class Cpu(Backend):
         return trainer
 
     def correct(self, task: Task, trainer: Trainer, views: dict[int, View], together: bool) -> None:
-        """Corrects the poses of all frames together, or each by itself, whose next steps then go on by its Hessian."""
+        """Corrects expressions, and the poses of all frames together, or each by itself, whose next steps go on by its Hessian."""
         with self.open_equations(task, trainer.gaussians(), views) as equations:
             if together:
                 correct_midway(task.poses, task.trained, trainer.gaussians, equations)
             else:
                 inverses = correct_each(task.poses, task.trained, trainer.gaussians, equations)
                 task.poses.newton = newton_steps(inverses, views)
+        correct_expressions(task.poses, trainer.gaussians(), views)
 
     @contextmanager
     def open_rounds(self, task: Task, views: dict[int, View], gaussians: Gaussians, plan: list[Round]) -> Iterator[Rounds]:

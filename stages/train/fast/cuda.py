@@ -31,19 +31,22 @@ from gsac.stages.train.finite import named_values, require_finite
 from gsac.stages.train.gaussians import cloth_offsets
 from gsac.stages.train.gaussians.joint_limits import TIE, limit_where_grown
 from gsac.stages.train.gaussians.mean_of_steps import MeanOfSteps
-from gsac.stages.train.gpu import LPIPS_STEPS, hand_back, open_trainer, train_until
+from gsac.stages.train.gpu import LPIPS_STEPS, hand_back, open_trainer, rest_shapes, train_until
 from gsac.stages.train.judge.heldout import TEST_END, TEST_MASK, TEST_RATE
 from gsac.stages.train.poses import bundle_adjust, own_errors
 from gsac.stages.train.poses.bundle_adjust import Equations
+from gsac.stages.train.poses.expressions import correct_expressions
 from gsac.stages.train.poses.photometric import CURVATURE, NormalEquations, joint_shares
-from gsac.stages.train.poses.poses import EXPRESSION, HAND_SHARE, JOINT, SHIFT, TURN, Poses
+from gsac.stages.train.poses.poses import HAND_SHARE, JOINT, SHIFT, TURN, Poses
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
 from gsac.stages.train.views import View, Views, of_each, person_crop
 
 MOMENTS = 10
 """Steps at most, spread evenly over the last ones, whose gaussians are read to be averaged."""
-POSES_STAY = {"pose_rate": 0.0, "expression_rate": 0.0, "joint_rate": 0.0}
+POSES_STAY = {"pose_rate": 0.0, "joint_rate": 0.0}
 
+Sizes = list[dict[int, View]]
+"""Trained frame -> its view, of half the size and of the whole."""
 SomeRecipe = TypeVar("SomeRecipe", bound=Recipe)
 
 
@@ -62,14 +65,14 @@ class Cuda(Backend):
                              least=schedule.shortest_axis(task), **limits_at_joints(task, count), **lpips_options(task))
         with (open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer,
               self.open_equations(task, gaussians, coarse) as equations):
-            self.train_correcting(trainer, task, equations, math.ceil(recipe.offset_share * recipe.steps))
+            self.train_correcting(trainer, task, [coarse, fine], equations, math.ceil(recipe.offset_share * recipe.steps))
             body = trainer.body
             folded = cloth_offsets.fold(trainer.gaussians(), body.rest[0], trainer.offset(), body.faces)
             task.poses.offset = np.zeros_like(task.poses.offset)
             middle = Trainer(folded, task, frozen_body=True)
             middle.lay_unseen(coarse)
             trainer.replace(middle.gaussians(), ~middle.seen, middle.reach)
-            mean = self.train_averaging(trainer, task, equations)
+            mean = self.train_averaging(trainer, task, [coarse, fine], equations)
             hand_back(trainer, task)
             kept = take_over(trainer, task)
             kept.values, kept.seen = mean.values(), middle.seen
@@ -114,25 +117,31 @@ class Cuda(Backend):
             yield CudaEquations(trainer, task.poses, frames)
             task.gpu_seconds += trainer.seconds
 
-    def train_correcting(self, trainer: CudaTrainer, task: Task, equations: Equations, until: int) -> None:
-        """Trains up to a step, and corrects the poses on the way where `Cpu.train` does. equations: of views of half the size."""
+    def train_correcting(self, trainer: CudaTrainer, task: Task, sizes: Sizes, equations: Equations, until: int) -> None:
+        """Trains up to a step, and corrects poses and expressions on the way where `Cpu.train` does.
+
+        sizes: the trainer's; equations: of views of half the size.
+        """
         poses, trained = task.poses, task.trained
-        for number, step in enumerate(schedule.correction_steps(task.config, trainer.recipe.steps, self.device)):
+        steps = trainer.recipe.steps
+        for number, step in enumerate(schedule.correction_steps(task.config, steps, self.device)):
             if trainer.state().step < step <= until:
                 train_until(trainer, task, step)
                 correct = own_errors.correct_each if number else bundle_adjust.correct_midway
                 correct(poses, trained, trainer.gaussians, equations)
+                correct_expressions(poses, trainer.gaussians(), sizes[step >= trainer.recipe.coarse_share * steps])
                 trainer.place(poses.pose[trained], poses.transl[trained])
+                trainer.wear(rest_shapes(poses, trained, np.zeros_like(poses.offset)))
         train_until(trainer, task, until)
 
-    def train_averaging(self, trainer: CudaTrainer, task: Task, equations: Equations) -> MeanOfSteps:
+    def train_averaging(self, trainer: CudaTrainer, task: Task, sizes: Sizes, equations: Equations) -> MeanOfSteps:
         """`train_correcting` to the end. Returns the mean over the last steps; with a network in the loss, over those it is in."""
         steps, mean = trainer.recipe.steps, MeanOfSteps()
         begin = schedule.averaged_from(steps, self.device)
         if task.network:
             begin = max(begin, steps - LPIPS_STEPS)
         for step in np.unique(np.linspace(begin + 1, steps, MOMENTS).round().astype(int)):
-            self.train_correcting(trainer, task, equations, int(step))
+            self.train_correcting(trainer, task, sizes, equations, int(step))
             mean.add(learned_values(trainer.gaussians()))
         return mean
 
@@ -164,13 +173,14 @@ class CudaRounds(Rounds):
 
 
 class CudaEquations:
-    """`bundle_adjust.Equations` of the frames that a PoseEquations holds, (n,) indices; it keeps the expressions of its start."""
+    """`bundle_adjust.Equations` of the frames that a PoseEquations holds, (n,) indices."""
 
     def __init__(self, trainer: PoseEquations, poses: Poses, frames: np.ndarray):
         self._trainer, self._poses, self._frames, self._worn = trainer, poses, frames, poses.offset.copy()
 
     def __call__(self, gaussians: Gaussians) -> list[tuple[int, NormalEquations]]:
         poses, frames = self._poses, self._frames
+        self._trainer.wear(rest_shapes(poses, frames, self._worn))
         found = self._trainer.measure(gaussians, poses.pose[frames], poses.transl[frames], poses.offset - self._worn,
                                       poses.rest(int(frames[0]))[1])
         turns = rotation.by_turns(poses.pose[frames][:, BODY], found.gradient[:, BODY])
@@ -187,7 +197,7 @@ def make_recipe(config: TrainConfig, count: int, kind: type[SomeRecipe] = Recipe
              "end": schedule.END, "mu_end": schedule.MU_END, "offset_rate": schedule.OFFSET_RATE,
              "offset_share": schedule.OFFSET_SHARE, "offset_every": cloth_offsets.EVERY, "smoothness": cloth_offsets.SMOOTHNESS,
              "gain_rate": schedule.GAIN_RATE if config.exposure else 0.0, "turn_unit": TURN, "shift_unit": SHIFT,
-             "expression_unit": EXPRESSION, "joint_unit": JOINT, "hand_share": HAND_SHARE}
+             "joint_unit": JOINT, "hand_share": HAND_SHARE}
     return kind.of(config, **(given | more))
 
 

@@ -182,19 +182,11 @@ class Trainer:
     def _move_body(self, t: int, grad_vertices: np.ndarray, done: float) -> None:
         """One step of frame t's pose and of the body's shape. grad_vertices: (V, 3)."""
         grad_rest, grad_joints = self.poses.step(t, grad_vertices, self.pose_rate * 0.01**done, self.config.pose_pull)
-        self._shape_body(t, grad_rest, grad_joints, done)
+        if self.config.joint_rate and self.pose_rate:
+            self.poses.step_joints(grad_joints, self.config.joint_rate * 0.01**done, self.config.pose_pull)
         if self.offsets:
             self.offsets.gather(grad_rest, OFFSET_RATE * 0.1 ** (done / OFFSET_SHARE))
             self.poses.offset = self.offsets.offset
-
-    def _shape_body(self, t: int, grad_rest: np.ndarray, grad_joints: np.ndarray, done: float) -> None:
-        """One step of frame t's expression and of the joints at rest, where these and the poses are learned."""
-        config = self.config
-        if config.expression_rate and self.pose_rate:
-            self.poses.step_expression(t, self.poses.expression_gradient(grad_rest), config.expression_rate * 0.01**done,
-                                       config.pose_pull)
-        if config.joint_rate and self.pose_rate:
-            self.poses.step_joints(grad_joints, config.joint_rate * 0.01**done, config.pose_pull)
 
     def gradients(self, step: Step, room: Room) -> StepGradients:
         """Of the loss of a frame; they lie in the room's buffers."""

@@ -21,10 +21,10 @@ HAND_SHARE = 0.1
 """Rate of the fingers relative to the body's: images constrain them weakly."""
 TURN, SHIFT = 0.05, 0.02
 """rad and m, units of a pose's distance from its start."""
-EXPRESSION, JOINT = 0.3, 0.01
-"""Coefficient and m, units of an expression's and a joint's distance from theirs."""
+JOINT = 0.01
+"""m, unit of a joint's distance from its own."""
 KEPT = ("pose", "transl", "base_pose", "base_transl", "moments", "count", "offset", "betas", "expression",
-        "expression_moments", "joint_offset", "joint_moments", "joint_count")
+        "joint_offset", "joint_moments", "joint_count")
 """Attributes of Poses that training changes."""
 
 
@@ -79,9 +79,10 @@ class Poses:
         self.rests: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self.shaped: tuple[np.ndarray, np.ndarray] | None = None
         self.moved: dict[int, np.ndarray] = {}
+        self.rest_expression = params.rest_expression
+        """(E,) of the face at rest, or None, neutral."""
         self.expression = np.zeros((frames, body.exprdirs.shape[2]))
         """(T, E), learned on top of the fit's, as is `joint_offset` (55, 3) m on top of the joints at rest."""
-        self.expression_moments = np.zeros((2, *self.expression.shape))
         self.joint_offset, self.joint_moments, self.joint_count = np.zeros((55, 3)), np.zeros((2, 55, 3)), 0
         self.joint_share = self.share.copy()
         self.joint_share[0] = 0  # the pelvis is where the translation puts it
@@ -93,9 +94,9 @@ class Poses:
         """An independent copy; steps start anew."""
         other = copy.copy(self)
         other.newton = {}
-        other.pose, other.transl = self.pose.copy(), self.transl.copy()
+        other.pose, other.transl, other.expression = self.pose.copy(), self.transl.copy(), self.expression.copy()
+        other.rests, other.moved = dict(self.rests), dict(self.moved)
         other.moments, other.count = np.zeros_like(self.moments), np.zeros_like(self.count)
-        other.expression_moments = np.zeros_like(self.expression_moments)
         return other
 
     def state(self) -> State:
@@ -135,7 +136,7 @@ class Poses:
 
     def at_rest(self) -> np.ndarray:
         """(V, 3) float32 m, in the T-pose and with the person's face at rest."""
-        return self.body.rest(self.betas, self.params.rest_expression, self.params.joint_offset)[0]
+        return self.body.rest(self.betas, self.rest_expression, self.params.joint_offset)[0]
 
     def vertices(self, t: int) -> np.ndarray:
         """(V, 3) float32 m, camera frame, in the frame's pose as it is now."""
@@ -146,7 +147,6 @@ class Poses:
         """Makes the poses as they stand the base that single frames are corrected from; Adam starts anew."""
         self.base_pose, self.base_transl = self.pose.copy(), self.transl.copy()
         self.moments, self.count = np.zeros_like(self.moments), np.zeros_like(self.count)
-        self.expression_moments = np.zeros_like(self.expression_moments)
 
     def transforms(self, t: int) -> np.ndarray:
         """(55, 3, 4) from rest to posed, without transl."""
@@ -193,10 +193,12 @@ class Poses:
         """(E,) gradient of a frame's expression from grad_rest (V, 3), of its rest vertices."""
         return np.tensordot(grad_rest, self.body.exprdirs, 2)
 
-    def step_expression(self, t: int, grad: np.ndarray, rate: float, pull: float) -> None:
-        """One Adam step of the expression of frame t, after `step`. grad: (E,)."""
-        grad = grad + 2 * pull * self.expression[t] / EXPRESSION**2
-        self.expression[t] -= adam_move(self.expression_moments[:, t], self.count[t], grad, rate)
+    def wear_expression(self, t: int, expression: np.ndarray) -> None:
+        """Sets what frame t has on top of the fit's expression, (E,), as far as the body's actions go."""
+        if self.body.has_actions:
+            fitted = self.params.expression[t]
+            expression = np.clip(fitted + expression, 0, 1) - fitted
+        self.expression[t] = expression
         self.rests.pop(t, None)
         self.moved.pop(t, None)
 
@@ -211,6 +213,7 @@ class Poses:
         params = replace(self.params, betas=self.betas.astype(np.float32), **split_pose(self.pose),
                          transl=self.transl.astype(np.float32),
                          expression=(self.params.expression + self.expression).astype(np.float32),
+                         rest_expression=self.rest_expression,
                          joint_offset=(self.params.joint_offset + self.joint_offset).astype(np.float32))
         params.joints = self.body.posed_joints(params)
         return params

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from gsac.avatar.body import Body
-from gsac.stages.face.resting_face import find_resting_face
+from gsac.avatar.resting_face import find_resting_face
 
 NAMES = Body.load().expression_names
-FRONT = np.array([0.0, 0.0, 1.0])
 
 
 def rest_of(frames: int = 90, seen: int = 90) -> dict[str, float]:
@@ -20,7 +19,7 @@ def rest_of(frames: int = 90, seen: int = 90) -> dict[str, float]:
     c[:, NAMES.index("mouthSmileLeft")] += 0.15 + 0.6 * (t % 30 < 8)
     for side in ("Left", "Right"):
         c[:, NAMES.index(f"eyeBlink{side}")] += 0.2 + 0.7 * (t % 12 < 2)
-    return dict(zip(NAMES, find_resting_face(c[:seen], np.tile(FRONT, (seen, 1))), strict=True))
+    return dict(zip(NAMES, find_resting_face(c[:seen], np.ones(seen)), strict=True))
 
 
 @pytest.mark.parametrize("seen", [90, 12])
@@ -35,9 +34,9 @@ def test_a_person_who_talks_laughs_and_blinks_rests_with_the_mouth_closed_and_th
 
 
 def test_of_a_few_photos_the_one_from_the_side_counts_least():
-    funnel, towards = NAMES.index("mouthFunnel"), np.array([FRONT, [0.8, 0, 0.6], FRONT])
+    funnel, towards = NAMES.index("mouthFunnel"), np.array([1.0, 0.6, 1.0])
     c = np.zeros((3, len(NAMES)))
     c[:, funnel] = 0.24, 0.0, 0.2
     assert find_resting_face(c, towards)[funnel] == 0.2
-    assert find_resting_face(c, np.roll(towards, 1, axis=0))[funnel] == 0.0
+    assert find_resting_face(c, np.roll(towards, 1))[funnel] == 0.0
     np.testing.assert_array_equal(find_resting_face(c[:1], towards[:1]), c[0])

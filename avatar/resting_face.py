@@ -14,12 +14,12 @@ LEAST_FACING = 0.05
 """Cosine to the camera that a face counts with at least."""
 
 
-def find_resting_face(c: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(E,) at rest, of actions c (V, E), 0..1, in V >= 1 frames in which the face looks in direction (V, 3).
+def find_resting_face(c: np.ndarray, facing: np.ndarray) -> np.ndarray:
+    """(E,) at rest, of actions c (V, E), 0..1, in V >= 1 frames. facing: (V,) cosine between where the face looks and the camera.
 
     The lower quartile of each action; a frame counts by how far the face looks into the camera.
     """
-    weight = np.maximum(direction[:, 2], LEAST_FACING) ** 2
+    weight = np.maximum(facing, LEAST_FACING) ** 2
     order = np.argsort(c, axis=0, kind="stable")
     below = np.cumsum(weight[order], axis=0)
     first = (below >= LASTING * weight.sum()).argmax(axis=0)
