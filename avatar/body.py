@@ -190,8 +190,21 @@ class Body:
         if joint_offset is not None:
             joints = joints + joint_offset
         if expression is not None and np.any(expression):
-            vertices = vertices + self.exprdirs @ np.asarray(expression, np.float32)
+            vertices = vertices + self.express(expression)
         return np.asarray(vertices, np.float32), np.asarray(joints, np.float32)
+
+    @cached_property
+    def expressive(self) -> tuple[np.ndarray, np.ndarray]:
+        """Indices (M,) of the vertices that expressions move, a quarter of the open body's, and what moves them, (M, 3, E) m."""
+        moved = np.flatnonzero(self.exprdirs.any((1, 2)))
+        return moved, np.ascontiguousarray(self.exprdirs[moved])
+
+    def express(self, expression: np.ndarray) -> np.ndarray:
+        """(V, 3) float32 m by which an expression, (E,), moves the vertices at rest."""
+        moved, directions = self.expressive
+        out = np.zeros(self.v_template.shape, np.float32)
+        out[moved] = directions @ np.asarray(expression, np.float32)
+        return out
 
     def effective_expression(self, params: BodyParams, t: int) -> np.ndarray:
         """(E,) expression of frame t. Where the body opens its mouth by expressions, those of the jaw's rotation are added."""
@@ -206,7 +219,7 @@ class Body:
         vertices = np.empty((len(frames), len(shaped), 3), np.float32)
         for i, t in enumerate(frames):
             expression = self.effective_expression(params, t)
-            rest = shaped + self.exprdirs @ expression if expression.any() else shaped
+            rest = shaped + self.express(expression) if expression.any() else shaped
             vertices[i] = skin(self.correct(rest, pose[i]), transforms[i], self.skin_index, self.skin_weight) + params.transl[t]
         return vertices, self._move_joints(transforms, joints) + params.transl[frames][:, None]
 

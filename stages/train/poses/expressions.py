@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.gaussians import Gaussians
-from gsac.avatar.joints import INDEX
+from gsac.avatar.joints import HEAD
 from gsac.avatar.raster import render_backward, render_bound_backward
 from gsac.avatar.resting_face import find_resting_face
 from gsac.avatar.threads import Workspace, side_by_side
@@ -19,7 +19,6 @@ from gsac.stages.train.views import View
 
 SPREAD = 0.1
 """Sigma of what the face stage is off by, in full actions."""
-HEAD = INDEX["head"]
 FACING = -0.4
 """Least `find_facing` of a frame: somewhat beyond a profile, where the face stage sees nothing, lips and brows still show."""
 MOVES, CARRIES = 2e-3, 2e-4
@@ -40,10 +39,8 @@ class Actions:
     def __init__(self, poses: Poses, face: np.ndarray):
         """face: (N,) of the gaussians."""
         body = poses.body
-        ways = np.abs(body.exprdirs).max((1, 2), initial=0)
-        self.poses, self.bounds, self.moving = poses, np.flatnonzero(ways > MOVES), np.flatnonzero(ways)
-        self.directions = body.exprdirs[self.moving]
-        """(M, 3, E) of the vertices that expressions move at all."""
+        self.poses, (self.moving, self.directions) = poses, body.expressive
+        self.bounds = self.moving[np.abs(self.directions).max((1, 2), initial=0) > MOVES]
         ways = body.exprdirs[body.faces[face]].mean(1)
         self.carried = np.flatnonzero(np.abs(ways).max((1, 2), initial=0) > CARRIES)
         self.ways = ways[self.carried]

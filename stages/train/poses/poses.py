@@ -41,7 +41,8 @@ def carry_to_untrained(poses: Poses, trained: np.ndarray) -> Poses:
     if out.expression.any():
         frames, at = np.arange(len(out.pose)), np.flatnonzero(is_trained)
         out.expression = np.stack([np.interp(frames, at, column[at]) for column in out.expression.T], 1)
-        out.forget_expressions()
+        for t in np.flatnonzero(~is_trained).tolist():
+            out.forget_expression(t)
     return out
 
 
@@ -115,6 +116,11 @@ class Poses:
         self.rests = {}
         self.shaped = None
 
+    def forget_expression(self, t: int) -> None:
+        """To be called when that of frame t has changed."""
+        self.rests.pop(t, None)
+        self.moved.pop(t, None)
+
     def forget_expressions(self) -> None:
         """To be called when expressions have changed."""
         self.rests, self.moved = {}, {}
@@ -128,7 +134,7 @@ class Poses:
             if t not in self.moved:
                 jaw = self.body.jaw_actions @ self.pose[t, JAW].astype(np.float32)
                 expression = np.asarray(p.expression[t] + jaw + self.expression[t], np.float32)
-                self.moved[t] = self.body.exprdirs @ expression if expression.any() else np.float32(0)
+                self.moved[t] = self.body.express(expression) if expression.any() else np.float32(0)
             vertices, joints = self.shaped
             self.rests[t] = np.ascontiguousarray(vertices + self.moved[t], np.float32), np.asarray(joints, np.float64)
         vertices, joints = self.rests[t]
@@ -199,8 +205,7 @@ class Poses:
             fitted = self.params.expression[t]
             expression = np.clip(fitted + expression, 0, 1) - fitted
         self.expression[t] = expression
-        self.rests.pop(t, None)
-        self.moved.pop(t, None)
+        self.forget_expression(t)
 
     def step_joints(self, grad: np.ndarray, rate: float, pull: float) -> None:
         """One Adam step of the joints at rest, which all frames share. grad: (55, 3)."""
