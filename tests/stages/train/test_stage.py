@@ -121,16 +121,19 @@ def test_any_number_of_cores_gives_the_same_bytes(job, monkeypatch):
 
 @pytest.mark.slow
 def test_the_resting_face_is_handed_on_and_alters_no_gaussian_but_recipe_paper_keeps_the_published_neutral_one(job):
-    made = {name: job(name, frames=6, steps=2, pose_test_steps=0, recipe=recipe)
-            for name, recipe in (("neutral", "fast"), ("own", "fast"), ("published", "paper"))}
+    made = {name: job(name, frames=6, steps=2, pose_test_steps=0, recipe=recipe, pose_rounds=rounds)
+            for name, recipe, rounds in (("neutral", "fast", 0), ("own", "fast", 0), ("moved", "fast", 1),
+                                         ("published", "paper", 0))}
     run(made["neutral"])
     body = made["own"].inputs["smplx/body.npz"]
     params = BodyParams.read(body)
     params.rest_expression = np.linspace(0, 0.3, params.expression.shape[1], dtype=np.float32)
     params.write(body)
-    run(made["own"]), run(made["published"])
+    run(made["own"]), run(made["moved"]), run(made["published"])
     assert (made["neutral"].out / "avatar.npz").read_bytes() == (made["own"].out / "avatar.npz").read_bytes()
     np.testing.assert_array_equal(BodyParams.read(made["own"].out / "body.npz").rest_expression, params.rest_expression)
+    away = np.abs(BodyParams.read(made["moved"].out / "body.npz").rest_expression - params.rest_expression).max()
+    assert 1e-6 < away < 0.05, "it moves as the frames' expressions are corrected"
     assert BodyParams.read(made["published"].out / "body.npz").rest_expression is None
 
 
