@@ -39,8 +39,8 @@ class Actions:
     def __init__(self, poses: Poses, face: np.ndarray):
         """face: (N,) of the gaussians."""
         body = poses.body
-        self.poses, (self.moving, self.directions) = poses, body.expressive
-        self.bounds = self.moving[np.abs(self.directions).max((1, 2), initial=0) > MOVES]
+        self.poses, (moved, directions) = poses, body.expressive
+        self.bounds = moved[np.abs(directions).max((1, 2), initial=0) > MOVES]
         ways = body.exprdirs[body.faces[face]].mean(1)
         self.carried = np.flatnonzero(np.abs(ways).max((1, 2), initial=0) > CARRIES)
         self.ways = ways[self.carried]
@@ -62,7 +62,7 @@ class Actions:
         """Gradient (E,) and Hessian (E, E) by the expression of frame t, of half the squared error `found` in the view."""
         means = found.state.means[self.carried]
         grads = render_bound_backward(found.state, found.colour, found.mask)
-        gradient = np.tensordot(self.poses.gradients(t, grads.vertices)[2][self.moving], self.directions, 2)
+        gradient = self.poses.expression_gradient(self.poses.gradients(t, grads.vertices)[2])
         tensors = render_backward(found.state, found.slope, np.zeros_like(found.mask)).rgb[self.carried]
         used = np.flatnonzero(tensors[:, 0] + tensors[:, 2] > FLAT)
         turns = np.tensordot(self.weights[used], self.poses.transforms(t)[:, :, :3], 1)

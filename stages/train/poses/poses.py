@@ -197,7 +197,8 @@ class Poses:
 
     def expression_gradient(self, grad_rest: np.ndarray) -> np.ndarray:
         """(E,) gradient of a frame's expression from grad_rest (V, 3), of its rest vertices."""
-        return np.tensordot(grad_rest, self.body.exprdirs, 2)
+        moved, directions = self.body.expressive
+        return np.tensordot(grad_rest[moved], directions, 2)
 
     def wear_expression(self, t: int, expression: np.ndarray) -> None:
         """Sets what frame t has on top of the fit's expression, (E,), as far as the body's actions go."""
