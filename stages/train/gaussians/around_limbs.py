@@ -19,7 +19,9 @@ TURNED = 0.1
 POLE = np.array([0, 0.8, -0.6], np.float32)
 """Direction in which a head's pole lies, up and back."""
 HEAD_OFF = 10.0
-"""m that the head lies off the other limbs: hair has no part in a collar."""
+"""m that the head lies off the other limbs, and its scalp off the face: hair has no part in a collar, nor has a cheek in hair."""
+HAIR, BEGINS = "hair", 0.5
+"""The body's clothes that grow on a scalp, and the share of their greatest thickness at which it begins."""
 MANY = 100
 """Gaussians that a colour is mixed of."""
 CLOSE = 0.01
@@ -36,14 +38,24 @@ ARMS = [i for i, name in enumerate(NAMES) if any(part in name for part in (
 def stretch(bound: Bound, face: np.ndarray, frames: FaceFrames, body: Body) -> np.ndarray:
     """(N, 7) m, places in which what lies around a limb is near, on the same side nearest. bound, frames: at rest; face: (N,).
 
-    Along a head is the way from its `POLE`: hair ends as far from it on all sides. It lies far from all other limbs.
+    Along a head is the way from its `POLE`: hair ends as far from it on all sides. It lies far from all other limbs, so does its
+    scalp, where the body tells it: the back of a head takes the colour of hair over the forehead, not of the cheeks below.
     """
-    skin = skin_weights(face, body)
-    arm, head = skin[:, ARMS].sum(1), skin[:, [HEAD, JAW, *EYES]].sum(1)
+    skin, scalp = skin_weights(face, body), find_scalp(face, body)
+    arm = skin[:, ARMS].sum(1)
+    head = np.maximum(skin[:, [HEAD, JAW, *EYES]].sum(1), scalp)  # hair at the nape, where the neck's share is large, is hair
     along = 1 + (ALONG - 1) * np.stack([arm, 1 - arm - head, np.zeros_like(arm)], 1)
     pole = bound.means[np.argmax(bound.means @ POLE * (head > 0.5))]
-    from_pole = head * (HEAD_OFF + ALONG * np.linalg.norm(bound.means - pole, axis=1))
+    from_pole = head * (HEAD_OFF + ALONG * np.linalg.norm(bound.means - pole, axis=1)) + HEAD_OFF * scalp
     return np.hstack([bound.means * along, from_pole[:, None], TURNED * frames.R[face, :, 1]])
+
+
+def find_scalp(face: np.ndarray, body: Body) -> np.ndarray:
+    """(N,) bool, whether gaussians lie where hair grows; nowhere on a body that has none among its clothes. face: (N,)."""
+    if HAIR not in body.clothes:
+        return np.zeros(len(face), bool)
+    thickness = np.linalg.norm(body.shapedirs[:, :, body.num_figure + body.clothes.index(HAIR)], axis=1)
+    return (thickness[body.faces] > BEGINS * thickness.max()).all(1)[face]
 
 
 def mix_colours(rgb: np.ndarray, weight: np.ndarray, places: np.ndarray, queries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

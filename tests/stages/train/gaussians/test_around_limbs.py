@@ -1,5 +1,7 @@
 """Colours of what no frame shows: a figure that was seen from the front alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import HEAD
 from gsac.avatar.light import shade
 from gsac.stages.train.fast.initial_gaussians import centres_at_rest
-from gsac.stages.train.gaussians.around_limbs import POLE, middle_means, stretch
+from gsac.stages.train.gaussians.around_limbs import POLE, find_scalp, middle_means, stretch
 from gsac.stages.train.gaussians.merge import skin_weights
 from gsac.stages.train.gaussians.nearest import find_nearest
 from gsac.stages.train.gaussians.unseen import colour_unseen
@@ -75,6 +77,18 @@ def test_hair_goes_on_as_far_from_the_crown_behind_as_it_does_at_the_temples(fro
     taken, beside = (known[find_nearest(where[known], where[back], 9)] for where in (places, front.at))
     assert len(back) > 50 and (weight[taken] > 0.5).mean() > 0.98
     assert 2 * np.median(np.abs(along[taken] - along[back, None])) < np.median(np.abs(along[beside] - along[back, None]))
+
+
+def test_the_back_of_a_head_takes_the_hair_over_the_forehead_and_not_the_skin_of_a_face(front):
+    """Of short hair the front shows little, of the face much, as far from the crown."""
+    scalp = find_scalp(front.gaussians.face, front.body)
+    front.gaussians.rgb[:] = np.where(scalp[:, None], TROUSERS, SHIRT)
+    assert 0.02 < front.seen[scalp].mean() < 0.4
+    behind = scalp & (front.normals[:, 2] < -0.5)
+    assert behind.sum() > 50
+    hair = np.abs(front.colours()[behind] - TROUSERS).max(1) < 0.02
+    assert hair.mean() > 0.9, "all but what lies beside the ears"
+    assert not find_scalp(front.gaussians.face, replace(front.body, clothes=())).any()
 
 
 def test_what_was_seen_well_counts_more_than_what_was_seen_at_a_slant(front):
