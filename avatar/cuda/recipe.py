@@ -66,8 +66,6 @@ class Recipe:
     """Adam rate of the betas, which all frames share."""
     expression_rate: float = 0.0
     """Adam rate of each frame's expression, falls to a hundredth; pulled to the fit's as poses are."""
-    expression_unit: float = 1.0
-    """Unit of an expression's distance from the fit's."""
     joint_rate: float = 0.0
     """m, Adam rate of the joints at rest, which all frames share; falls and is pulled likewise."""
     joint_unit: float = 1.0

@@ -68,7 +68,7 @@ extern "C" __global__ void __launch_bounds__(256) expression_step(Scene s) {
     if (threadIdx.x > 0) return;
     size_t at = size_t(now.frame.pose) * s.expression_count + blockIdx.x;
     adam_pulled(s.expression[at], double(sum) / s.batch, s.expression_first[at], s.expression_second[at], s.pose_steps[now.frame.pose],
-                double(now.plan.expression), double(s.pose_pull), double(s.expression_unit), s.fresh, s.tiny);
+                double(now.plan.expression), double(s.pose_pull), 1.0, s.fresh, s.tiny);
 }
 
 // One block, after the step's pose update: the joints at rest.

@@ -62,10 +62,10 @@ NUMBERS = {"frame_count": INT, "batch": INT, "count": INT, "vertex_count": INT, 
            "series_terms": INT, "series_middle": FLOAT, "series_half": FLOAT, "offset_every": INT, "beta_count": INT,
            "area": FLOAT, "half_side": FLOAT, "edges": FLOAT, "dice_weight": FLOAT, "knn": FLOAT, "scale_limit": FLOAT,
            "masked": INT, "window_width": INT, "window_height": INT, "whole_width": INT, "whole_height": INT,
-           "perceptual": FLOAT, "expression_count": INT, "expression_unit": FLOAT, "joint_unit": FLOAT,
+           "perceptual": FLOAT, "expression_count": INT, "joint_unit": FLOAT,
            "hessian_parts": INT, "fresh": DOUBLE, "tiny": DOUBLE}
 """area: pixels that a frame's losses are a mean over, 0: its own; it and the next six are recipe `paper`'s (paper.cuh); the next
-five are LPIPS' (perceptual.cuh), the next three belong to expressions and joints at rest (shape.cuh), the next one to the
+five are LPIPS' (perceptual.cuh), the next two belong to expressions and joints at rest (shape.cuh), the next one to the
 poses' normal equations (equations.cuh), the last two to Adam of the body."""
 
 

@@ -240,7 +240,7 @@ class CudaTrainer:
         scene.max_pixels = max(h * w for h, w in sizes)
         scene.max_tiles = max(-(-h // TILE) * -(-w // TILE) for h, w in sizes)
         for name in ("ssim", "sobel", "mask", "pose_pull", "turn_unit", "shift_unit", "needle", "least", "reach", "tie",
-                     "offset_every", "expression_unit", "joint_unit", "fresh", "tiny"):
+                     "offset_every", "joint_unit", "fresh", "tiny"):
             setattr(scene, name, getattr(recipe, name))
 
     def _open_window(self, network: FeatureDistance, windows: int = 1, precision: str = "bfloat16") -> None:
