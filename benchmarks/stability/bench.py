@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from gsac.pipeline.command_parser import CommandParser
 
 if TYPE_CHECKING:
+    from gsac.benchmarks.stability.fault import Fault
     from gsac.benchmarks.stability.trial import Task
     from gsac.pipeline.journal import Journal
 
@@ -37,7 +38,8 @@ def parser() -> CommandParser:
                      help=f"default: all, {DEFAULT} first; --quick: {DEFAULT}")
     out.add_argument("--until", default="smplx", choices=["smplx", "train"], help="train: also a short training (default: smplx)")
     out.add_argument("--clip", type=Path, action="append", default=[], metavar="DIR",
-                     help="a truth clip: a folder with clip.mp4, mask/ and truth.npz; may be repeated (default: seeds 31 to 33)")
+                     help="a truth clip: a folder with clip.mp4, mask/ and truth.npz; may be repeated (default: seeds 31 to 33); "
+                          "faults of the person need the seed that it was rendered with, and a name seedN that tells it")
     out.add_argument("--frames", type=int, default=30, help="kept of each clip, evenly (default: 30)")
     out.add_argument("--kept", type=int, default=None, metavar="N",
                      help="that the run keeps of those frames, and `gsac check` then its own number, as of clips that people film "
@@ -159,10 +161,34 @@ def list_tasks(options: argparse.Namespace, say: Journal) -> list[Task]:
     severities = [s for s in (3, 5, 1, 4, 2) if s in (options.severities or ([3] if quick else range(1, 6)))]
     sizes = TINY if quick else {"frames": options.frames, "height": options.height}
 
+    seedless = find_seedless(faults, clips, options.fault or [], say)
+
     def task(fault: str, severity: int, seed: int, method: str) -> Task:
         return Task(clips[seed % len(clips)].resolve(), fault, severity, seed, method, options.out.resolve(), **sizes,
                     until=options.until, kept=options.kept)
 
     return [each for method in options.methods or ([DEFAULT] if quick else METHODS)
             for each in ([task(CLEAN, 0, seed, method) for seed in seeds[:len(clips)]]
-                         + [task(f.name, severity, seed, method) for severity in severities for seed in seeds for f in faults])]
+                         + [task(f.name, severity, seed, method) for severity in severities for seed in seeds for f in faults
+                            if f.origin is not Origin.PERSON or clips[seed % len(clips)] not in seedless])]
+
+
+def find_seedless(faults: list[Fault], clips: list[Path], asked: list[str], say: Journal) -> list[Path]:
+    """Clips whose person cannot be rendered anew, since their names tell no seed; says which of the faults they are spared.
+
+    asked: faults that the user named. Raises BadInput where one of them needs the seed.
+    """
+    from gsac.benchmarks.stability.fault import Origin
+    from gsac.benchmarks.stability.trial import seed_of
+    from gsac.stages.contract import BadInput
+
+    seedless = [clip for clip in clips if seed_of(clip.resolve()) is None]
+    anew = [fault.name for fault in faults if fault.origin is Origin.PERSON]
+    if not seedless or not anew:
+        return seedless
+    why = "their person is rendered anew with the clip's seed, and only a folder named seedN tells it"
+    folders = ", ".join(map(str, seedless))
+    if named := [name for name in anew if name in asked]:
+        raise BadInput(f"{folders}: no clip for {', '.join(named)}: {why}")
+    say.note(f"{folders}: {', '.join(anew)} left out: {why}")
+    return seedless

@@ -26,7 +26,7 @@ from gsac.benchmarks.stability.stages import BEFORE, Finding, read_artifact, run
 from gsac.benchmarks.stability.take import Take, read_take
 from gsac.pipeline.clip_check import LAST, PARAMS, check_clip
 from gsac.pipeline.journal import plain_journal
-from gsac.stages.contract import BadInput, StageError
+from gsac.stages.contract import StageError
 from gsac.stages.findings import Code
 from gsac.stages.severity import Severity
 from gsac.turntable.options import TurntableOptions
@@ -184,21 +184,20 @@ def render_person(task: Task, fault: Fault) -> Path:
     """Folder of the clip of the same person who behaves otherwise; rendered unless it is there.
 
     It has no more frames and rows than the trial looks at, at the clean clip's times and with the noise of its scaled frames.
+    The clip's name tells its seed.
     """
-    seed, rate = _seed_of(task.clip), Film(read_take(task.clip, task.frames, task.height)).rate
-    options, _ = fault.inject({"seed": seed}, task.severity, task.seed)
+    rate = Film(read_take(task.clip, task.frames, task.height)).rate
+    options, _ = fault.inject({"seed": seed_of(task.clip)}, task.severity, task.seed)
     options |= {"frames": task.frames, "height": task.height, "fps": rate, "crf": CRF,
                 "noise": TurntableOptions.noise * task.height / HEIGHT}
     folder = task.out / "clips" / hash_code("gsac.turntable.clip")
     return render_clip(folder / f"{task.clip.name}_{fault.name}_{task.severity}", plain_journal(), **options)
 
 
-def _seed_of(clip: Path) -> int:
-    """Of a clip that this benchmark names, seedN or seedN_FRAMES."""
+def seed_of(clip: Path) -> int | None:
+    """Of a clip that is named seedN, N or seedN_FRAMES; None where the name tells none."""
     digits = clip.name.removeprefix("seed").split("_")[0]
-    if not digits.isdigit():
-        raise BadInput(f"{clip}: a person who behaves otherwise is rendered from the clip's seed; expected a folder named seedN")
-    return int(digits)
+    return int(digits) if digits.isdecimal() else None
 
 
 def _run(task: Task, fault: Fault | None, take: Take, trial: Trial) -> tuple[dict[str, Path], Take]:

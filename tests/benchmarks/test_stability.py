@@ -331,11 +331,29 @@ def test_a_worker_that_hangs_or_dies_costs_its_trial_only(tmp_path, monkeypatch)
 
 
 def test_default_methods_come_first_and_every_fault_is_tried(tmp_path):
-    options = bench.parser().parse_args(["--clip", str(tmp_path), "--seeds", "0", "--severities", "3", "--out", str(tmp_path)])
+    clip = tmp_path / "seed1"
+    options = bench.parser().parse_args(["--clip", str(clip), "--seeds", "0", "--severities", "3", "--out", str(tmp_path)])
     tasks = bench.list_tasks(options, None)
     assert [t.method for t in tasks] == sorted(t.method for t in tasks)
     assert {t.fault for t in tasks} == {CLEAN, *(f.name for f in FAULTS.values() if f.origin is not Origin.BODY)}
     assert {FAULTS[name].origin for name in QUICK} >= {Origin.TAKE, Origin.POINTS, Origin.ALPHA}
+
+
+def test_a_clip_whose_name_tells_no_seed_is_spared_the_faults_that_need_it_and_they_are_named(tmp_path, capsys):
+    options = bench.parser().parse_args(["--clip", str(tmp_path / "ada"), "--clip", str(tmp_path / "seed4_60"), "--seeds", "0", "1",
+                                         "--severities", "3", "--methods", DEFAULT, "--out", str(tmp_path)])
+    tasks = bench.list_tasks(options, plain_journal())
+    anew = {f.name for f in FAULTS.values() if f.origin is Origin.PERSON}
+    tried = {clip: {t.fault for t in tasks if t.clip.name == clip} for clip in ("ada", "seed4_60")}
+    assert tried["seed4_60"] - tried["ada"] == anew and "blur" in tried["ada"]
+    said = " ".join(capsys.readouterr().err.split())
+    assert f"{tmp_path / 'ada'}:" in said and "hoodie" in said and "only a folder named seedN tells it" in said
+
+
+def test_a_fault_that_needs_the_seed_is_refused_before_anything_runs_where_the_name_tells_none(tmp_path):
+    with pytest.raises(BadInput, match="ada: no clip for hoodie: .* only a folder named seedN tells it"):
+        bench.main(["--clip", str(tmp_path / "ada"), "--fault", "blur", "hoodie", "--out", str(tmp_path / "out")])
+    assert not (tmp_path / "out" / "trials.jsonl").exists()
 
 
 def test_trials_of_other_settings_are_not_mixed(tmp_path):
