@@ -10,6 +10,7 @@ from typing import Any
 from gsac.cache.store import Store
 from gsac.pipeline.asked_clip import find_clip
 from gsac.pipeline.cost_forecast import Forecaster
+from gsac.pipeline.errors import NotUpToDateError
 from gsac.pipeline.executors.executor import ClipJob
 from gsac.pipeline.graph import CLIP
 from gsac.pipeline.keys import KeysOfOneMoment
@@ -39,9 +40,9 @@ class ClipPlan:
     peak_mb: float = 0.0
     """Memory of the largest of them."""
     digest: str = ""
-    """Of the clip; empty where it cannot run."""
+    """Of the clip; empty where it cannot be read or the folder is another's."""
     error: str = ""
-    """Why it cannot run: the clip cannot be read, or the folder is another's."""
+    """Why it cannot run: the clip cannot be read, the folder is another's, or what `--from` needs is not in the cache."""
     before_gpu: str = ""
     """Last stage before those that a GPU computes; empty where none of those is due."""
 
@@ -67,9 +68,9 @@ class BatchPlanner:
     def __init__(self, project: Project, configs: dict[str, Any], store: Store, options: Options, replace: bool = False):
         """replace: whether other clips' avatars in the folders give way."""
         self.keys, self.store, self._replace = KeysOfOneMoment(project, configs, store), store, replace
-        self._graph, self._force = project.graph, options.force
-        nowhere = RunFolder(store.root)  # only asked for the stages
-        self.steps = ClipRun(project, configs, store, nowhere, keys=self.keys).select(options)
+        self._graph, self._options = project.graph, options
+        self._clip_run = functools.partial(ClipRun, project, configs, store, keys=self.keys)
+        self.steps = self._clip_run(RunFolder(store.root)).select(options)  # the folder is not asked for anything
         self._outputs = {name: project.outputs(name) for name in self.steps}
         self._forecaster = Forecaster(self.keys, store)
         self._peak_mb = functools.cache(lambda name: _peak_mb(name, store))
@@ -91,8 +92,19 @@ class BatchPlanner:
         due = tuple(plan.stage for plan in plans if plan.cached is None)
         if not due:
             return ClipPlan(job, digest=digest)
+        if self._options.start is not None and (error := self._refusal(folder, digest)):
+            return ClipPlan(job, digest=digest, error=error)
         seconds = self._forecaster.foretell(plans, job.clip).whole.seconds
         return ClipPlan(job, due, seconds, max(map(self._peak_mb, due)), digest, before_gpu=self._before_gpu(due))
+
+    def _refusal(self, folder: RunFolder, digest: str) -> str:
+        """What the run will end with, in its own words; empty where that is not known before it runs."""
+        clip_run = self._clip_run(folder)
+        try:
+            clip_run.foresee_refusal(clip_run.plan_of(digest, self._options), self._options)
+        except NotUpToDateError as error:
+            return str(error)
+        return ""
 
     def _before_gpu(self, due: tuple[str, ...]) -> str:
         first = next((n for n, name in enumerate(self.steps) if name in due and self.keys.device_of(name)), 0)
@@ -102,7 +114,7 @@ class BatchPlanner:
         """Like ClipRun's, without looking for what has changed since earlier runs."""
         parts = self.keys.parts(name, inputs)
         record = self.store.lookup(parts.key, self._outputs[name])
-        reason = Reason.FORCED if name in self._force else Reason.FIRST_RUN if record is None else Reason.UP_TO_DATE
+        reason = Reason.FORCED if name in self._options.force else Reason.FIRST_RUN if record is None else Reason.UP_TO_DATE
         return StagePlan(name, reason, parts, record)
 
 

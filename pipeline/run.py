@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
@@ -15,10 +15,11 @@ from gsac.cache.errors import CacheError, IntegrityError
 from gsac.cache.key import KeyParts
 from gsac.cache.lease import in_use
 from gsac.cache.record import Record
+from gsac.cache.root import named_remote
 from gsac.cache.store import Store
 from gsac.pipeline import dvc_sync
 from gsac.pipeline.errors import NotUpToDateError, StageFailedError
-from gsac.pipeline.graph import CLIP
+from gsac.pipeline.graph import CLIP, Graph
 from gsac.pipeline.keys import Keys
 from gsac.pipeline.outcomes import Outcome
 from gsac.pipeline.pace import Course
@@ -166,6 +167,11 @@ class ClipRun:
         """What would run and why, as far as it is known before anything runs."""
         return self.plan_of(source_digest(clip, self.store), options)
 
+    def foresee_refusal(self, plans: Iterable[StagePlan], options: Options) -> None:
+        """NotUpToDateError where a run of these plans is sure to end so; where results are shared only the run itself can tell."""
+        if named_remote() is None:
+            refuse_stale(self.graph, plans, options)
+
     def plan_of(self, digest: str, options: Options) -> list[StagePlan]:
         """The same of a clip by its tree digest, be it there or gone."""
         return self._plan_all(self.select(options), {CLIP: digest}, options)
@@ -188,7 +194,6 @@ class ClipRun:
         Raises StageFailedError, NotUpToDateError, CacheError; run.json and finished stages are kept in any case.
         """
         steps = self.select(options)
-        required = self.graph.above(options.start) if options.start else set()
         source = Source(clip, self.store)
         digests = {CLIP: source.digest}
         paths = {CLIP: clip}
@@ -209,9 +214,7 @@ class ClipRun:
                 plans[name] = plan
                 outcome, record = Outcome.CACHED, plan.cached
                 if record is None:
-                    if name in required:
-                        raise NotUpToDateError(f"stage {name} is not up to date ({plan.sentence}); "
-                                               f"run without --from {options.start}")
+                    refuse_stale(self.graph, [plan], options)
                     maker = self._maker_of_damaged(name, paths)
                     if maker is not None:
                         at = steps.index(maker)
@@ -352,6 +355,14 @@ def _use_time(runner: StageRunner, coming: list[str], near_end: Callable[[list[s
     runner.prepare(*coming[1:1 + AHEAD])
     if len(coming) <= LAST:
         near_end(coming)
+
+
+def refuse_stale(graph: Graph, plans: Iterable[StagePlan], options: Options) -> None:
+    """NotUpToDateError where a stage that the first one (`--from`) needs would have to run."""
+    needed = graph.above(options.start) if options.start is not None else set()
+    for plan in plans:
+        if plan.stage in needed and plan.cached is None:
+            raise NotUpToDateError(f"stage {plan.stage} is not up to date ({plan.sentence}); run without --from {options.start}")
 
 
 def refuse_hopeless(record: Record) -> None:

@@ -22,6 +22,7 @@ from gsac.pipeline.commands.options import (
     progress_reporter,
     values_of_person,
 )
+from gsac.pipeline.errors import NotUpToDateError, attach_summary
 from gsac.pipeline.json_output import emit
 from gsac.pipeline.other_clip import make_way
 from gsac.pipeline.outcomes import ExitCode, Outcome
@@ -83,7 +84,7 @@ def do(arguments: argparse.Namespace) -> ExitCode:
 
 
 def dry_run(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainReporter, json: bool) -> ExitCode:
-    """Reports what would run and why, and how long it would take."""
+    """Reports what would run and why, and how long it would take. Raises NotUpToDateError as the run would."""
     plans = clip_run.plan(clip, options)
     rows = []
     for plan in plans:
@@ -92,6 +93,11 @@ def dry_run(clip_run: ClipRun, clip: Path, options: Options, reporter: PlainRepo
         reporter.foresees(plan.stage, outcome, info.seconds if info else 0.0, f"{plan.reason.value}: {plan.sentence}")
         rows.append({"name": plan.stage, "status": outcome.value, "seconds": info.seconds if info else None,
                      "key": plan.parts.key if plan.parts else None, "reason": plan.reason.value})
+    try:
+        clip_run.foresee_refusal(plans, options)
+    except NotUpToDateError as error:
+        attach_summary(error, {"stages": rows})
+        raise
     forecast = clip_run.foretell(clip, plans, options)
     if json:
         emit({"stages": rows, "outputs": {}, "metrics": {}, "quality": quality_entry(options.quality, clip_run.configs),

@@ -136,8 +136,10 @@ def test_force_and_from_reach_every_clip(toy, clips, out):
     assert statuses(toy.gsac("batch", clips, "--out", out, "--force", "left", "--json")) == dict.fromkeys(
         ("one", "two", "three"), "done")
     assert toy.runs.count("left") == ran + 3
-    late = toy.gsac("batch", clips, "--out", out, "--from", "join", "--set", "left.word=last")
-    assert late.code == 1 and "stage left is not up to date" in late.err
+    dry, late = (toy.gsac("batch", clips, "--out", out, "--from", "join", "--set", "left.word=last", "--json", *more)
+                 for more in (["--dry-run"], []))
+    assert dry.code == late.code == 1 and "stage left is not up to date" in late.err and "3 cannot run" in dry.err
+    assert [row["error"] for row in dry.json["clips"]] == [row["error"] for row in late.json["clips"]]
 
 
 def test_a_clip_that_kills_its_stage_is_tried_once_more_alone_and_then_set_aside(toy, clips, out):

@@ -30,6 +30,19 @@ def test_from_refuses_with_exit_code_3_when_something_above_is_not_in_the_cache(
     assert toy.runs == ["cut", "left", "right", "join"]
 
 
+@pytest.mark.parametrize("words", [["--set", "cut.keep=1"], ["--force", "cut"]], ids=" ".join)
+def test_dry_run_refuses_as_the_run_does_what_from_needs_and_is_not_in_the_cache(toy, words):
+    toy.ran()
+    dry, done = (toy.run("--from", "right", *words, *more) for more in (["--dry-run"], []))
+    assert dry.code == done.code == 3 and dry.json["error"] == done.json["error"]
+    assert "stage cut is not up to date" in dry.err and dry.statuses["cut"] == "planned"
+    assert toy.run("--from", "right", "--set", "left.word=last", "--dry-run").code == 0, "left is beside right, not above it"
+
+
+def test_dry_run_foretells_no_refusal_where_another_machine_may_have_the_result(toy):
+    assert toy.run("--from", "right", "--dry-run", GSAC_REMOTE="s3://nowhere").code == 0
+
+
 def test_dry_run_says_what_would_run_and_why_and_runs_nothing(toy):
     toy.ran()
     toy.runs_file.write_text("")
