@@ -47,7 +47,7 @@ class Code(Enum):
     LIES_ON_SIDE = Wording("The person lies on the side in {frames}: was the phone held across?",
                            "Turn the clip by a quarter in the phone's gallery, so that the person stands, and give it again.",
                            Severity.WRONG)
-    SECOND_PERSON = Wording("A second person was seen in {frames}; only the first one is followed.",
+    SECOND_PERSON = Wording("A second person was seen in {frames}; {followed} is followed.",
                             "Keep others out of the picture or cut these frames.")
     CUT_OFF = Wording("The edge of the picture cuts off {parts}; what lies outside is guessed.",
                       "Stand in the middle, and farther away if head, hands and feet do not fit into the picture.")

@@ -33,8 +33,8 @@ class Frame:
     """(468, 3) px; NaN where no face is found."""
     region: Region | None = None
     """Where the followed person is; not part of the file."""
-    second_person: bool = False
-    """Whether somebody else is seen beside the followed person; not part of the file."""
+    others: list[Region] = field(default_factory=list)
+    """Where others are seen beside the followed person; not part of the file."""
 
     @property
     def seen(self) -> bool:

@@ -28,6 +28,7 @@ from gsac.stages.keypoints.lying import find_lying
 from gsac.stages.keypoints.mediapipe import Mediapipe
 from gsac.stages.keypoints.mmpose_points import MmposePoints
 from gsac.stages.keypoints.second_look import look_again
+from gsac.stages.keypoints.second_person import name_followed
 from gsac.stages.keypoints.simcc import Wholebody
 
 DETECTORS: dict[DetectorName, type[Detector]] = {"mediapipe": Mediapipe, "onnx-wholebody": Wholebody,
@@ -92,9 +93,9 @@ def report(job: Job, frames: list[Frame], cuts: list[set[Cut]]) -> None:
         job.warn(Finding.of(Code.NO_PERSON, ~seen))
     if (lying := find_lying(frames)).any():
         job.warn(Finding.of(Code.LIES_ON_SIDE, lying))
-    second = np.array([f.second_person for f in frames])
+    second = np.array([bool(f.others) for f in frames])
     if second.any():
-        job.warn(Finding.of(Code.SECOND_PERSON, second))
+        job.warn(Finding.of(Code.SECOND_PERSON, second, followed=name_followed(frames)))
     if any(cuts):
         job.warn(Finding.of(Code.CUT_OFF, np.array([bool(cut) for cut in cuts]), parts=name_cuts(cuts)))
     for side, points in HANDS.items():

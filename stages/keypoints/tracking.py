@@ -35,7 +35,7 @@ class Tracker:
 
     def track(self, image: np.ndarray, frame: Frame) -> Pose | None:
         """image: (H, W, 3) uint8, the next frame. Returns the followed person's pose, None when not seen; sets
-        `frame.second_person`."""
+        `frame.others`."""
         persons = self._pose.persons(image, self._least)
         pose = self._follow(image, persons)
         if pose is not None:
@@ -74,7 +74,7 @@ class Tracker:
         return None
 
     def _second(self, image: np.ndarray, persons: list[Person], pose: Pose, frame: Frame) -> None:
-        """Notes in the frame whether somebody else is seen."""
+        """Notes in the frame where somebody else is seen."""
         for person in persons:
             if apart(person.region, pose.region) < BESIDE:
                 continue
@@ -82,7 +82,8 @@ class Tracker:
             score = min(person.score, other.score)
             middles = [points[[11, 12, 23, 24]].mean(axis=0) for points in (other.points, pose.points)]
             far = np.hypot(*(middles[0] - middles[1])) > 0.15 * min(other.region.side, pose.region.side)
-            frame.second_person |= bool(far and score >= SECOND_SCORE)
+            if far and score >= SECOND_SCORE:
+                frame.others.append(other.region)
 
 
 def prominence(region: Region, width: int, height: int) -> float:

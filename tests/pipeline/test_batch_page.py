@@ -25,7 +25,7 @@ FOUND = {"The camera moves by up to 9 px, in frame 3. Stand the phone on somethi
          "The face was never seen from the front; the avatar's face stays at rest.": {"code": "face_at_rest", "severity": "poorer"},
          "The edge of the picture cuts off the head in all 9 frames; what lies outside is guessed. Stand in the middle.":
          {"code": "cut_off", "severity": "poorer"},
-         "A second person was seen in 2 of 9 frames (0-1); only the first one is followed. Keep others out of the picture.":
+         "A second person was seen in 2 of 9 frames (0-1); the one on the left in the picture is followed. Keep others out.":
          {"code": "second_person", "severity": "poorer"}}
 AXE = "axe-core@4.10.3"
 

@@ -8,6 +8,7 @@ import pytest
 
 from gsac.avatar.artifacts import read_arrays
 from gsac.avatar.network_files import ModelMissingError, model_path
+from gsac.avatar.region import Region
 from gsac.avatar.wholebody import FACE, HANDS
 from gsac.benchmarks.perception import run_keypoints, run_stage, score_squats, score_truth, video_frames, write_split
 from gsac.stages.contract import BadInput, Job, make_config
@@ -16,6 +17,7 @@ from gsac.stages.keypoints import STAGE
 from gsac.stages.keypoints.config import MODELS, DetectorName, KeypointsConfig
 from gsac.stages.keypoints.cut_off import Cut, find_cuts
 from gsac.stages.keypoints.detection import Frame
+from gsac.stages.keypoints.second_person import name_followed
 from gsac.stages.keypoints.stage import DETECTORS, judge_size, report, run
 
 FOOTAGE = Path(__file__).resolve().parents[4] / "shared" / "footage"
@@ -93,11 +95,23 @@ def test_hardly_any_frame_with_a_person_is_told_as_hopeless_at_once():
 def test_warnings_name_the_frames_without_a_person_and_with_two():
     whole = dict(HANDS, face=FACE)
     two = seen(**whole)
-    two.second_person = True
+    two.region, two.others = Region((30, 100), 60), [Region((70, 100), 60)]
     warnings = warnings_of([seen(**whole), Frame(), Frame(), two])
     assert len(warnings) == 2
     assert "No person was found in 2 of 4 frames (1-2)" in warnings[0]
-    assert "second person was seen in frame 3" in warnings[1]
+    assert "second person was seen in frame 3; the one on the left in the picture is followed." in warnings[1]
+
+
+@pytest.mark.parametrize(("own", "others", "words"), [
+    ((70, 60), [(30, 60)], "the one on the right in the picture"),
+    ((50, 90), [(30, 60), (80, 60)], "the larger one"),
+    ((50, 60), [(30, 90), (80, 90)], "the smaller one"),
+    ((50, 60), [(30, 60), (80, 60)], "only one of them"),
+])
+def test_who_is_followed_is_told_by_side_or_else_by_size(own, others, words):
+    frame = Frame()
+    frame.region, *frame.others = (Region((x, 100), side) for x, side in (own, *others))
+    assert name_followed([Frame(), frame]) == words
 
 
 def test_what_flickers_like_a_person_without_face_or_hand_is_refused_at_once():
@@ -191,7 +205,7 @@ def test_the_same_person_is_followed_when_a_second_one_comes(tmp_path, store):
     alone, pair = np.hstack([first[0], np.full_like(other, 130)]), np.hstack([first[1], other])
     arrays, warnings = stage_on([alone, pair], tmp_path, store)
     assert (arrays["xy"][:, 5:17, 0] < 720).all()
-    assert any("second person was seen in frame 1" in w for w in warnings)
+    assert any("second person was seen in frame 1; the one on the left in the picture is followed" in w for w in warnings)
 
 
 @pytest.mark.footage

@@ -51,7 +51,7 @@ def track(tracker: Tracker, there: list[Region], detected: list[int]) -> tuple[f
     tracker._pose.there, tracker._pose.detected = there, detected
     frame = Frame()
     pose = tracker.track(IMAGE, frame)
-    return None if pose is None else pose.region.center[0], frame.second_person
+    return None if pose is None else pose.region.center[0], bool(frame.others)
 
 
 def test_a_back_that_is_not_detected_is_followed_though_another_face_is_near(tracker):
