@@ -18,6 +18,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from gsac.avatar import rotation
+from gsac.avatar.directions import spread_directions
 from gsac.avatar.joints import INDEX, J
 from gsac.avatar.mesh import vertex_normals
 from gsac.avatar.zbuffer import rasterise
@@ -213,10 +214,7 @@ class ArmPaths:
 @cache
 def list_poses(side: int) -> np.ndarray:
     """(K, 3, 3, 3) rotations of shoulder and elbow from all over what people can do, and of a straight wrist."""
-    i = np.arange(DIRECTIONS) + 0.5
-    height, turn = 1 - 2 * i / DIRECTIONS, np.pi * (1 + 5**0.5) * i  # Fibonacci's spiral
-    across = np.sqrt(1 - height**2)
-    way, bone = np.stack([across * np.cos(turn), height, across * np.sin(turn)], 1), np.array([1.0, 0, 0])
+    way, bone = spread_directions(DIRECTIONS, 0.5)[:, [0, 2, 1]], np.array([1.0, 0, 0])
     axis = np.cross(bone, way)
     swing = rotation.exp(axis / np.linalg.norm(axis, axis=1, keepdims=True) * np.arccos(way[:, :1]))
     shoulder = swing[:, None] @ rotation.exp(TWISTS[:, None] * bone)

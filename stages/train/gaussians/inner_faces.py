@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.camera import Camera
+from gsac.avatar.directions import spread_directions
 from gsac.avatar.threads import side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
 
@@ -32,13 +33,6 @@ def find_inner(rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
         return visible_points(placed[faces].mean(1), rasterise(placed, faces, camera)[2], camera, SLACK)
 
     return ~np.any(side_by_side(show, spread_directions(SIDES)), axis=0)
-
-
-def spread_directions(count: int) -> np.ndarray:
-    """(count, 3) unit vectors, evenly spread: a Fibonacci lattice."""
-    height = 1 - (2 * np.arange(count) + 1) / count
-    around, radius = np.pi * (1 + 5**0.5) * np.arange(count), np.sqrt(1 - height**2)
-    return np.stack([radius * np.cos(around), radius * np.sin(around), height], 1)
 
 
 def axes_along(direction: np.ndarray) -> np.ndarray:

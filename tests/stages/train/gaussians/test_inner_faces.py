@@ -2,7 +2,8 @@ import numpy as np
 import trimesh
 
 from gsac.avatar.body import Body
-from gsac.stages.train.gaussians.inner_faces import SIDES, axes_along, find_inner, spread_directions
+from gsac.avatar.directions import spread_directions
+from gsac.stages.train.gaussians.inner_faces import SIDES, axes_along, find_inner
 from gsac.turntable.person import REGIONS
 
 
@@ -34,11 +35,8 @@ def test_of_the_body_the_closed_mouth_and_the_backs_of_the_eyes_are_inner_and_no
     assert inner[~head].mean() < 0.001
 
 
-def test_the_sides_are_unit_vectors_all_round_and_cameras_look_along_them():
-    sides = spread_directions(SIDES)
-    np.testing.assert_allclose(np.linalg.norm(sides, axis=1), 1)
-    assert np.abs(sides.mean(0)).max() < 0.03
-    for side in sides:
+def test_cameras_look_along_the_sides():
+    for side in spread_directions(SIDES):
         axes = axes_along(side)
         np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(axes) > 0 and np.allclose(axes[2], side)
