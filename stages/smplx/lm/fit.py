@@ -193,9 +193,11 @@ def move_contradicted(arms: HiddenArms, problem: Problem, state: State,
     missing: (T, 2) bool, hands that were not detected; None: all were.
     """
     missing = np.zeros((len(state.local), 2), bool) if missing is None else missing.astype(bool)
-    doubtful = find_contradicted(arms, problem, state, missing) | find_untold(arms, problem, state, missing)
-    state, rested = rest_arms(arms, problem, state, doubtful, missing)
-    moved = find_contradicted(arms, problem, state, missing) & ~rested
+    contradicted = find_contradicted(arms, problem, state, missing)
+    state, rested = rest_arms(arms, problem, state, contradicted | find_untold(arms, problem, state, missing), missing)
+    if rested.any():  # the trunk and the other arm have moved, too
+        contradicted = find_contradicted(arms, problem, state, missing)
+    moved = contradicted & ~rested
     settled = move(arms, problem, state, moved, missing)
     moved &= (settled.local != state.local)[:, ARM_JOINTS].any((2, 3, 4))
     for side in (0, 1):

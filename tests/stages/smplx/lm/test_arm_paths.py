@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from gsac.avatar import rotation
+from gsac.stages.smplx.lm import fit
 from gsac.stages.smplx.lm.arm_paths import BARE, QUICKEST, THIN, ArmPaths, list_poses
+from gsac.stages.smplx.lm.doubtful_arms import find_contradicted
 from gsac.stages.smplx.lm.fit import move_contradicted
 from gsac.stages.smplx.lm.hidden_arms import ARM_JOINTS, ELBOW, HAND, WRIST, Stay, isolate_arm
 from gsac.stages.smplx.lm.hidden_search import ON_BELLY, hiding_pose
@@ -148,4 +150,16 @@ def test_only_arms_that_rest_or_move_before_the_rounds_are_still_or_free_from_th
     assert np.array_equal(wider.any(1), (moved | rested)[:, 0]) and (slower | quicker).any(1)[BENT].all()
     assert not slower.any(1)[~rested[:, 0]].any() and quicker.any(1)[moved[:, 0]].all()
     assert {*BODY_JOINTS[(slower | quicker | wider).any(0)]} <= {*ARM_JOINTS[0]}
+    problem.loose[:], problem.spread[:] = loose, spread
+
+
+def test_doubts_are_worked_out_anew_only_where_an_arm_has_come_to_rest(hand_in_hair, monkeypatch):
+    (arms, problem, truth), looked = hand_in_hair, []
+    loose, spread = problem.loose.copy(), problem.spread.copy()
+    monkeypatch.setattr(fit, "find_contradicted", lambda *words: looked.append(words) or find_contradicted(*words))
+    assert not move_contradicted(arms, problem, truth, None)[2].any() and len(looked) == 1
+    rested = np.zeros((FRAMES, 2), bool)
+    rested[BENT, 0] = True
+    monkeypatch.setattr(fit, "rest_arms", lambda arms, problem, state, *words: (hang(state), rested))
+    assert not move_contradicted(arms, problem, truth, None)[1][BENT, 0].any() and looked[-1][2] is not truth and len(looked) == 3
     problem.loose[:], problem.spread[:] = loose, spread
