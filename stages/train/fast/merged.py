@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gsac.avatar.binding import face_frames
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.joints import HEAD, JAW, WRISTS, J
@@ -31,8 +32,8 @@ def merge_trainer(gaussians: Gaussians, seen: np.ndarray, size: int, task: Task,
     body, rest = task.poses.body, task.poses.rest(int(task.trained[0]))[0]
     worth = count_pixels(gaussians, task, views) * viewing_weight(gaussians, body)
     fewer, seen = merge_to_size(gaussians, seen, worth, size, body, rest)
-    covering = cover_unseen(fewer, seen, rest, body.faces)
-    trainer = Trainer(level_heights(covering, rest, body.faces), task, frozen_body=True, scale=scale)
+    frames = face_frames(rest, body.faces)
+    trainer = Trainer(level_heights(cover_unseen(fewer, seen, frames), frames), task, frozen_body=True, scale=scale)
     trainer.seen = seen
     return trainer
 

@@ -225,10 +225,11 @@ class Trainer:
         views: frame -> view at half the size.
         """
         gaussians, pixels = self.gaussians(), self._front_pixels(views)
-        self.seen = find_seen(pixels, gaussians, self.rest, self.faces)
-        laid = flatten_unseen(gaussians, self.seen, self.rest, self.faces)
-        laid.rgb = colour_unseen(gaussians, pixels, self.seen, self.rest, self.poses.body)
-        gaussians = level_heights(laid, self.rest, self.faces)
+        frames = face_frames(self.rest, self.faces)
+        self.seen = find_seen(pixels, gaussians, frames)
+        laid = flatten_unseen(gaussians, self.seen, frames)
+        laid.rgb = colour_unseen(gaussians, pixels, self.seen, frames, self.poses.body)
+        gaussians = level_heights(laid, frames)
         self.values = learned_values(gaussians)
         self.start = gaussians.mu.copy()
 
@@ -239,14 +240,14 @@ class Trainer:
         """
         gaussians, seen = self.gaussians(), self.seen
         some = dict(list(views.items())[::math.ceil(len(views) / EVIDENCE_FRAMES)])
-        pixels = self._front_pixels(views if seen is None else some)
+        pixels, frames = self._front_pixels(views if seen is None else some), face_frames(self.rest, self.faces)
         if seen is None:
-            seen = find_seen(pixels, gaussians, self.rest, self.faces)
+            seen = find_seen(pixels, gaussians, frames)
             gaussians.rgb = fill_unseen(gaussians.rgb, seen, centres_at_rest(gaussians, self.rest, self.faces))
         if self.gains:  # drawn without a gain, the avatar is as bright as the frames are on average
             gaussians.rgb = np.clip(gaussians.rgb * np.mean(list(self.gains.values()), 0), 0, 1).astype(np.float32)
-        gaussians.rgb = hold_barely_seen(gaussians, pixels, seen, self.rest, self.faces)
-        return level_heights(gaussians, self.rest, self.faces), seen
+        gaussians.rgb = hold_barely_seen(gaussians, pixels, seen, frames)
+        return level_heights(gaussians, frames), seen
 
     def _front_pixels(self, views: dict[int, View]) -> np.ndarray:
         """(N,) pixels that each gaussian shows of its front, mean over the frames."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_matrix
 
-from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.binding import FaceFrames, bind
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.around_limbs import hold_colours
 from gsac.stages.train.gaussians.disc_area import divisible_areas
@@ -34,15 +34,13 @@ FREE = 1e-6
 """What even an unseen gaussian's own colour weighs, likewise: where nothing around is seen, it stays."""
 
 
-def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, rest: np.ndarray,
-                     faces: np.ndarray) -> np.ndarray:
+def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, frames: FaceFrames) -> np.ndarray:
     """(N, 3) colours in 0..1, those of barely seen places held to what was well seen around.
 
-    pixels: (N,) `front_pixels`, mean over the frames; seen: (N,) bool; rest: (V, 3) m; faces: (F, 3).
+    pixels: (N,) `front_pixels`, mean over the clip's frames; seen: (N,) bool; frames: of all faces at rest.
     """
     if not seen.any():
         return gaussians.rgb
-    frames = face_frames(rest, faces)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     near, alike = find_place(bound.means, frames.R[gaussians.face, :, 1])
     areas = divisible_areas(bound)

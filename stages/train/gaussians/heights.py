@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.binding import FaceFrames, bind, face_frames
+from gsac.avatar.binding import FaceFrames, bind
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.nearest import find_nearest
 
@@ -14,13 +14,12 @@ SPARSE = 3000
 """Gaussians of an avatar below which STEP grows with their spacing: shrunk, they would leave holes."""
 
 
-def level_heights(gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
-    """The gaussians, moved to within STEP (`SPARSE`: more) of the median height around them. rest: (V, 3) m; faces: (F, 3).
+def level_heights(gaussians: Gaussians, frames: FaceFrames) -> Gaussians:
+    """The gaussians, moved to within STEP (`SPARSE`: more) of the median height around them. frames: of all faces at rest.
 
     One whose standard deviation along the face's normal is larger than that shrinks to it.
     """
     step = STEP * max(1, SPARSE / max(len(gaussians), 1)) ** 0.5
-    frames = face_frames(rest, faces)
     size = np.maximum(frames.k[gaussians.face], 1e-9)
     height, usual = find_heights(gaussians, frames)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.binding import bind, face_frames
+from gsac.avatar.binding import FaceFrames, bind, face_frames
 from gsac.avatar.camera import Camera
 from gsac.avatar.gaussians import Gaussians
 from gsac.avatar.raster import render_bound
@@ -36,9 +36,12 @@ def front_pixels(gaussians: Gaussians, vertices: np.ndarray, faces: np.ndarray, 
     return np.clip((facing - BEHIND) / (FRONT - BEHIND), 0, 1) * added
 
 
-def find_seen(pixels: np.ndarray, gaussians: Gaussians, rest: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(N,) bool, whether gaussians are seen. pixels: (N,) `front_pixels`, mean over the frames; rest: (V, 3) m; faces: (F, 3)."""
-    bound = bind(face_frames(rest, faces), gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
+def find_seen(pixels: np.ndarray, gaussians: Gaussians, frames: FaceFrames) -> np.ndarray:
+    """(N,) bool, whether gaussians are seen.
+
+    pixels: (N,) `front_pixels`, mean over the clip's frames; frames: of all faces at rest.
+    """
+    bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     share = pixels / divisible_areas(bound)
     seen = pixels > LEAST_SHOWN
     return seen & (share > LEAST_SHARE * np.median(share[seen])) if seen.any() else seen

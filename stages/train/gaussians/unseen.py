@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gsac.avatar.binding import Bound, FaceFrames, bind, face_frames
+from gsac.avatar.binding import Bound, FaceFrames, bind
 from gsac.avatar.body import Body
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.stages.train.gaussians.around_limbs import hold_colours, mix_colours, stretch
@@ -30,15 +30,14 @@ BESIDE, FAR = 0.01, 0.03
 outline; from the second on colours are those around the limb, and discs cover."""
 
 
-def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
+def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, frames: FaceFrames) -> Gaussians:
     """The gaussians, unseen ones as flat discs that cover the body, no higher over it than their neighbours.
 
-    Opacity stays: it is learned from the masks. seen: (N,) bool; rest: (V, 3) m; faces: (F, 3).
+    Opacity stays: it is learned from the masks. seen: (N,) bool; frames: of all faces at rest.
     """
     poor, known = np.flatnonzero(~seen), np.flatnonzero(seen)
     if not len(poor) or not len(known):
         return gaussians
-    frames = face_frames(rest, faces)
     size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
     near = known[find_nearest(middle[known], middle[poor], NEIGHBOURS)]
     out = gaussians[np.arange(len(gaussians))]
@@ -46,19 +45,18 @@ def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, fac
     out.mu[poor, 1] = np.minimum(gaussians.mu[poor, 1], height)
     widths = disc_widths(gaussians, size)
     lay_discs(out, poor, np.minimum(np.median(widths[near], axis=1), widths[poor]) / size[poor])
-    return cover_unseen(out, seen, rest, faces)
+    return cover_unseen(out, seen, frames)
 
 
-def cover_unseen(gaussians: Gaussians, seen: np.ndarray, rest: np.ndarray, faces: np.ndarray) -> Gaussians:
+def cover_unseen(gaussians: Gaussians, seen: np.ndarray, frames: FaceFrames) -> Gaussians:
     """The gaussians, those far from all that is seen as discs that leave no gap: what lies behind a limb shines through none.
 
-    A wide disc would stand off a round limb. So it sinks, until its edge meets the surface. seen: (N,) bool; rest: (V, 3) m;
-    faces: (F, 3).
+    A wide disc would stand off a round limb. So it sinks, until its edge meets the surface. seen: (N,) bool; frames: of all
+    faces at rest.
     """
     poor, known = np.flatnonzero(~seen), np.flatnonzero(seen)
     if not len(poor) or not len(known):
         return gaussians
-    frames = face_frames(rest, faces)
     size = np.maximum(frames.k[gaussians.face], 1e-9)
     means = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means
     spacing = np.linalg.norm(means[find_nearest(means, means[poor], RING + 1)[:, -1]] - means[poor], axis=1)
@@ -99,15 +97,14 @@ def far_share(away: np.ndarray) -> np.ndarray:
     return np.clip((away - BESIDE) / (FAR - BESIDE), 0, 1)
 
 
-def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, rest: np.ndarray, body: Body) -> np.ndarray:
+def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, frames: FaceFrames, body: Body) -> np.ndarray:
     """(N, 3) colours, those of unseen gaussians as what is seen beside them, farther off mixed of what is seen around the limb.
 
-    pixels: (N,) `front_pixels`, mean over the frames; seen: (N,) bool; rest: (V, 3) m.
+    pixels: (N,) `front_pixels`, mean over the clip's frames; seen: (N,) bool; frames: of all faces at rest.
     """
     poor, known = np.flatnonzero(~seen), np.flatnonzero(seen)
     if not len(poor) or not len(known):
         return gaussians.rgb
-    frames = face_frames(rest, body.faces)
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
     beside = known[find_nearest(bound.means[known], bound.means[poor], NEIGHBOURS)]
     out = gaussians[np.arange(len(gaussians))]

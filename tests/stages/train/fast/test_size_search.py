@@ -80,8 +80,8 @@ def test_a_size_is_the_mean_of_its_last_steps():
 def test_sizes_are_judged_as_they_are_handed_out(job_anywhere, monkeypatch):
     level_heights, judge, judged = trainer.level_heights, size_search.judge_person, []
 
-    def marked(gaussians, rest, faces):
-        return replace(level_heights(gaussians, rest, faces), rgb=np.full_like(gaussians.rgb, 0.25))
+    def marked(gaussians, frames):
+        return replace(level_heights(gaussians, frames), rgb=np.full_like(gaussians.rgb, 0.25))
 
     def watched(candidates):
         judged.append(candidates[0].gaussians)

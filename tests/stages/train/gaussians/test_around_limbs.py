@@ -36,7 +36,7 @@ class Front:
         """(N, 3) after what the front shows, from any colours."""
         unknown = np.random.default_rng(0).random((int((~self.seen).sum()), 3))
         self.gaussians.rgb[~self.seen] = unknown
-        return colour_unseen(self.gaussians, self.pixels, self.seen, self.body.v_template, self.body)
+        return colour_unseen(self.gaussians, self.pixels, self.seen, face_frames(self.body.v_template, self.body.faces), self.body)
 
 
 @pytest.fixture

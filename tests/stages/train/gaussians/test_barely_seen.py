@@ -57,7 +57,7 @@ class Filmed(NamedTuple):
 
     def held(self, gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray) -> np.ndarray:
         """(N, 3) colours. pixels, seen: (N,)."""
-        return hold_barely_seen(gaussians, pixels, seen, self.trainer.rest, self.trainer.faces)
+        return hold_barely_seen(gaussians, pixels, seen, face_frames(self.trainer.rest, self.trainer.faces))
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +120,7 @@ def test_a_place_seen_a_little_is_held_too_and_the_more_is_seen_the_more_its_own
     full, counts, green = filmed.pixels, [], []
     for share in np.linspace(0, 0.4, 17):
         pixels = np.where(place, share * full, full)
-        seen = find_seen(pixels, gaussians, filmed.trainer.rest, filmed.trainer.faces)
+        seen = find_seen(pixels, gaussians, face_frames(filmed.trainer.rest, filmed.trainer.faces))
         counts.append(seen[chest])
         green.append(filmed.held(gaussians, pixels, seen)[chest, 1])
     assert green[int(np.argmax(counts))] == pytest.approx(SHIRT[0][1], abs=1e-4), "it counts as seen, and barely so"

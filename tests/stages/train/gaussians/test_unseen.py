@@ -23,6 +23,11 @@ def body():
     return Body.load()
 
 
+def at_rest(body):
+    """Frames of its faces."""
+    return face_frames(body.v_template, body.faces)
+
+
 def covering(body, count=4000):
     gaussians = Gaussians.area(body.v_template, body.faces, count, 0)
     return gaussians, centres_at_rest(gaussians, body.v_template, body.faces)
@@ -39,7 +44,7 @@ def test_a_front_view_shows_the_chest_and_neither_back_nor_soles(body):
     gaussians, at = covering(body)
     vertices, camera = standing(body)
     pixels = shown.front_pixels(gaussians, vertices, body.faces, camera, Workspace(1))
-    normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
+    normal = at_rest(body).R[gaussians.face, :, 1]
     height = (at[:, 1] - at[:, 1].min()) / np.ptp(at[:, 1])
     trunk, soles = (np.abs(at[:, 0]) < 0.1) & (height > 0.55) & (height < 0.75), (height < 0.01) & (normal[:, 1] < -0.8)
     assert np.median(pixels[trunk & (normal[:, 2] > 0.5)]) > 0.5
@@ -53,7 +58,7 @@ def test_unseen_gaussians_lie_flat_and_no_higher_than_their_neighbours_and_seen_
     seen = at[:, 1] > at[:, 1].min() + 0.05
     gaussians.mu[~seen] += rng.normal(0, 2, (int((~seen).sum()), 3)).astype(np.float32)
     gaussians.quat[~seen] = rng.normal(size=(int((~seen).sum()), 4))
-    out = unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces)
+    out = unseen.flatten_unseen(gaussians, seen, at_rest(body))
     np.testing.assert_array_equal(out.quat[~seen], [[1, 0, 0, 0]] * int((~seen).sum()))
     assert out.mu[~seen, 1].max() < 1e-3, "the neighbours lie on the surface"
     np.testing.assert_array_equal(out.opacity, gaussians.opacity)
@@ -69,11 +74,11 @@ def from_behind(body):
 
 def test_unseen_discs_leave_no_gap_and_the_outline_of_what_is_seen_stays(body):
     gaussians, at = covering(body)
-    normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
+    normal = at_rest(body).R[gaussians.face, :, 1]
     seen = normal[:, 2] > -0.2
     gaussians.log_scale[~seen] -= np.log(2)
     gaussians.opacity[:] = 0.95
-    out = unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces)
+    out = unseen.flatten_unseen(gaussians, seen, at_rest(body))
 
     def alpha(which, view):
         vertices, camera = view(body)
@@ -93,11 +98,11 @@ def test_unseen_discs_leave_no_gap_and_the_outline_of_what_is_seen_stays(body):
 
 def test_what_merging_opened_is_covered_anew_within_the_outline(body):
     gaussians, at = covering(body)
-    normal = face_frames(body.v_template, body.faces).R[gaussians.face, :, 1]
+    normal = at_rest(body).R[gaussians.face, :, 1]
     seen = normal[:, 2] > -0.2
     gaussians.opacity[:] = 0.95
     merged, still = merge_to_size(gaussians, seen, np.where(seen, 10.0, 0.0), 2200, body, body.v_template)
-    covered = unseen.cover_unseen(merged, still, body.v_template, body.faces)
+    covered = unseen.cover_unseen(merged, still, at_rest(body))
     back, camera = from_behind(body)
     trunk = np.flatnonzero((normal[:, 2] < -0.9) & (np.abs(at[:, 0]) < 0.1) & (at[:, 1] > 0))
     x, y = camera.project(face_frames(back, body.faces).T[gaussians.face[trunk]].astype(np.float64)).astype(int).T
@@ -116,8 +121,8 @@ def test_what_merging_opened_is_covered_anew_within_the_outline(body):
 def test_where_nothing_or_everything_is_seen_nothing_changes(body):
     gaussians, _ = covering(body, 300)
     for seen in (np.zeros(300, bool), np.ones(300, bool)):
-        assert unseen.flatten_unseen(gaussians, seen, body.v_template, body.faces) is gaussians
-        assert unseen.colour_unseen(gaussians, 10.0 * seen, seen, body.v_template, body) is gaussians.rgb
+        assert unseen.flatten_unseen(gaussians, seen, at_rest(body)) is gaussians
+        assert unseen.colour_unseen(gaussians, 10.0 * seen, seen, at_rest(body), body) is gaussians.rgb
 
 
 def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
@@ -128,7 +133,7 @@ def test_a_floater_is_stray_alpha_and_a_long_gaussian_a_needle(body):
     clean = novel_poses.judge_novel(gaussians, poses)
     assert clean["stray_alpha"] < 1e-4 and clean["needle_share"] == 0
     armpit = int(np.argmin(np.linalg.norm(at - body.keypoint_matrix[5] @ body.v_template, axis=1)))
-    gaussians.mu[armpit, 1] += 0.2 / face_frames(body.v_template, body.faces).k[gaussians.face[armpit]]
+    gaussians.mu[armpit, 1] += 0.2 / at_rest(body).k[gaussians.face[armpit]]
     gaussians.log_scale[armpit] += 1.5
     assert novel_poses.judge_novel(gaussians, poses)["stray_alpha"] > 10 * max(clean["stray_alpha"], 1e-4)
     gaussians.log_scale[7] += [3, 0, 0]
@@ -149,9 +154,9 @@ def test_the_face_has_a_box_from_the_front_and_none_from_behind(body):
 def test_no_gaussian_stands_off_those_around_it_and_the_others_stay(body):
     gaussians, at = covering(body)
     off = np.arange(len(gaussians)) % 50 == 0
-    size = face_frames(body.v_template, body.faces).k[gaussians.face]
+    size = at_rest(body).k[gaussians.face]
     gaussians.mu[off, 1] += 0.06 / size[off]
-    out = heights.level_heights(gaussians, body.v_template, body.faces)
+    out = heights.level_heights(gaussians, at_rest(body))
     assert (size * out.mu[:, 1])[off].max() < heights.STEP + 0.005
     np.testing.assert_allclose(out.mu[~off], gaussians.mu[~off], atol=1e-6)
     np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
@@ -159,30 +164,30 @@ def test_no_gaussian_stands_off_those_around_it_and_the_others_stay(body):
 
 def test_a_disc_that_sticks_out_of_the_surface_shrinks(body):
     gaussians, _ = covering(body)
-    size = face_frames(body.v_template, body.faces).k[gaussians.face]
+    size = at_rest(body).k[gaussians.face]
     out_of = np.arange(len(gaussians)) % 50 == 0
     gaussians.quat[out_of] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
     gaussians.log_scale[out_of, 2] = np.log(0.05 / size[out_of])
-    out = heights.level_heights(gaussians, body.v_template, body.faces)
+    out = heights.level_heights(gaussians, at_rest(body))
     assert (size * np.exp(out.log_scale[:, 2]))[out_of].max() == pytest.approx(heights.STEP, rel=1e-4)
 
 
 def test_the_discs_of_a_coarse_level_keep_the_width_that_covers_the_body(body):
     gaussians = Gaussians.area(body.v_template, body.faces, heights.SPARSE // 4)
-    size = face_frames(body.v_template, body.faces).k[gaussians.face]
+    size = at_rest(body).k[gaussians.face]
     gaussians.quat[:] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
     gaussians.log_scale[:, 2] = np.log(1.8 * heights.STEP / size)
-    out = heights.level_heights(gaussians, body.v_template, body.faces)
+    out = heights.level_heights(gaussians, at_rest(body))
     np.testing.assert_allclose(out.log_scale, gaussians.log_scale, atol=1e-6)
 
 
 def test_what_is_shown_little_for_its_size_is_not_seen(body):
     gaussians, at = covering(body)
-    frames = face_frames(body.v_template, body.faces)
+    frames = at_rest(body)
     area = (frames.k[gaussians.face] * np.exp(gaussians.log_scale[:, 0])) ** 2
     pixels = 4000 * area
     pixels[:100] *= 0.1
     assert pixels[:100].max() > shown.LEAST_SHOWN
-    seen = shown.find_seen(pixels, gaussians, body.v_template, body.faces)
+    seen = shown.find_seen(pixels, gaussians, at_rest(body))
     assert not seen[:100].any() and seen[100:][pixels[100:] > shown.LEAST_SHOWN].all()
-    assert not shown.find_seen(np.zeros(len(gaussians)), gaussians, body.v_template, body.faces).any()
+    assert not shown.find_seen(np.zeros(len(gaussians)), gaussians, at_rest(body)).any()
