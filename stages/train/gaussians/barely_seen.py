@@ -14,7 +14,7 @@ from gsac.avatar.binding import FaceFrames, bind
 from gsac.avatar.gaussians import Gaussians
 from gsac.stages.train.gaussians.around_limbs import hold_colours
 from gsac.stages.train.gaussians.disc_area import divisible_areas
-from gsac.stages.train.gaussians.nearest import find_nearest
+from gsac.stages.train.gaussians.nearest import find_nearest_among
 from gsac.stages.train.gaussians.shown import AROUND, find_evidence, find_place
 from gsac.stages.train.poses.bundle_adjust import conjugate_gradients
 
@@ -52,8 +52,8 @@ def hold_barely_seen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray,
     sure = np.flatnonzero(seen & (evidence >= SURE) & (shown >= SURE * np.median(shown[seen])))
     poor = np.flatnonzero(evidence < SURE)
     if len(sure) and len(poor):
-        around = find_nearest(bound.means[sure], bound.means[poor], AROUND)
-        held = hold_colours(out, poor, sure[around], frames.R[:, :, 1])
+        around = find_nearest_among(bound.means, sure, poor, AROUND)
+        held = hold_colours(out, poor, around, frames.R[:, :, 1])
         share = np.clip((SURE - evidence[poor]) / (SURE - HELD), 0, 1)[:, None]
         out.rgb[poor] = np.where(share < 1, out.rgb[poor] + share * (held - out.rgb[poor]), held)
     return out.rgb

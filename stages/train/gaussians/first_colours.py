@@ -17,7 +17,7 @@ from gsac.avatar.numba_kernel import own_kernel
 from gsac.avatar.threads import Workspace, side_by_side
 from gsac.avatar.zbuffer import rasterise, visible_points
 from gsac.stages.train.gaussians.light_from_above import find_from_above
-from gsac.stages.train.gaussians.nearest import find_nearest
+from gsac.stages.train.gaussians.nearest import find_nearest_among
 
 TOLD = 10.0
 """Independent observations of the light in a frame: its errors are correlated over large parts of the body."""
@@ -163,6 +163,6 @@ def fill_unseen(rgb: np.ndarray, seen: np.ndarray, places: np.ndarray) -> np.nda
     """rgb (N, 3) with unseen rows replaced by the mean of the 4 nearest seen ones. seen: (N,) bool; places: (N, 3) m at rest."""
     if seen.all() or not seen.any():
         return rgb
-    out = rgb.copy()
-    out[~seen] = rgb[seen][find_nearest(places[seen], places[~seen], 4)].mean(1)
+    out, poor = rgb.copy(), np.flatnonzero(~seen)
+    out[poor] = rgb[find_nearest_among(places, np.flatnonzero(seen), poor, 4)].mean(1)
     return out

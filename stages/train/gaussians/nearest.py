@@ -16,3 +16,8 @@ def find_nearest(places: np.ndarray, queries: np.ndarray, count: int) -> np.ndar
     most = min(count, len(places))
     threads = kernel_threads() if len(queries) >= MANY else 1
     return KDTree(places).query(queries, k=most, workers=threads)[1].reshape(len(queries), most)
+
+
+def find_nearest_among(places: np.ndarray, some: np.ndarray, which: np.ndarray, count: int) -> np.ndarray:
+    """(M, K) indices of the places (N, D), only those in `some` (L,), that are nearest to places `which` (M,); K is at most L."""
+    return some[find_nearest(places[some], places[which], count)]

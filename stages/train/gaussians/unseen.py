@@ -12,7 +12,7 @@ from gsac.avatar.body import Body
 from gsac.avatar.gaussians import FLATNESS, Gaussians
 from gsac.stages.train.gaussians.around_limbs import hold_colours, mix_colours, stretch
 from gsac.stages.train.gaussians.disc_area import divisible_areas
-from gsac.stages.train.gaussians.nearest import find_nearest
+from gsac.stages.train.gaussians.nearest import find_nearest, find_nearest_among
 from gsac.stages.train.gaussians.shown import find_evidence, find_place
 
 NEIGHBOURS = 8
@@ -39,7 +39,7 @@ def flatten_unseen(gaussians: Gaussians, seen: np.ndarray, frames: FaceFrames) -
     if not len(poor) or not len(known):
         return gaussians
     size, middle = np.maximum(frames.k[gaussians.face], 1e-9), frames.T[gaussians.face]
-    near = known[find_nearest(middle[known], middle[poor], NEIGHBOURS)]
+    near = find_nearest_among(middle, known, poor, NEIGHBOURS)
     out = gaussians[np.arange(len(gaussians))]
     height = np.median(size[near] * gaussians.mu[near, 1], axis=1) / size[poor]
     out.mu[poor, 1] = np.minimum(gaussians.mu[poor, 1], height)
@@ -60,7 +60,7 @@ def cover_unseen(gaussians: Gaussians, seen: np.ndarray, frames: FaceFrames) -> 
     size = np.maximum(frames.k[gaussians.face], 1e-9)
     means = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale).means
     spacing = np.linalg.norm(means[find_nearest(means, means[poor], RING + 1)[:, -1]] - means[poor], axis=1)
-    away = np.linalg.norm(means[known[find_nearest(means[known], means[poor], 1)[:, 0]]] - means[poor], axis=1)
+    away = np.linalg.norm(means[find_nearest_among(means, known, poor, 1)[:, 0]] - means[poor], axis=1)
     radius = find_radii(frames.T[gaussians.face], frames.R[gaussians.face, :, 1], poor)
     width, own = far_share(away) * np.minimum(COVER * spacing, radius / EDGE), disc_widths(gaussians, size)[poor]
     wider = width > own
@@ -106,7 +106,7 @@ def colour_unseen(gaussians: Gaussians, pixels: np.ndarray, seen: np.ndarray, fr
     if not len(poor) or not len(known):
         return gaussians.rgb
     bound = bind(frames, gaussians.face, gaussians.mu, gaussians.quat, gaussians.log_scale)
-    beside = known[find_nearest(bound.means[known], bound.means[poor], NEIGHBOURS)]
+    beside = find_nearest_among(bound.means, known, poor, NEIGHBOURS)
     out = gaussians[np.arange(len(gaussians))]
     out.rgb[poor] = gaussians.rgb[beside].mean(1)
     out.rgb[poor] = hold_colours(out, poor, beside, frames.R[:, :, 1])
