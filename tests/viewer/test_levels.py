@@ -7,9 +7,9 @@ import pytest
 
 from gsac.avatar.film import PITCH, look_at
 from gsac.avatar.gsac_file.write import avatar_bytes
-from gsac.avatar.person_height import person_height
 from gsac.avatar.skinning import joint_transforms
 from gsac.benchmarks.viewer import browser as chromium
+from gsac.stages.train.fast.drawn_height import person_height
 from gsac.viewer.page import page_bytes
 
 pytestmark = [pytest.mark.slow,

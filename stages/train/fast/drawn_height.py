@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gsac.avatar.person_height import person_height
 from gsac.stages.train.judge.heldout import Candidate, judge_person
 from gsac.stages.train.poses.poses import Poses
 from gsac.stages.train.views import View, of_each
@@ -32,6 +31,15 @@ def typical_height(poses: Poses, views: Mapping[int, View]) -> float:
     """px, the person's median height in the views. views: frame -> view."""
     joints = poses.to_params().joints
     return float(np.median([person_height(np.ptp(poses.rest(t)[0][:, 1]), joints[t], views[t].camera.focal[1]) for t in views]))
+
+
+def person_height(stature: float, joints: np.ndarray, focal: float) -> float:
+    """px in a picture, as the file's levels mean it (docs/gsac-format.md, Level): of a body `stature` m high at rest, where the
+    joint nearest to the eye is.
+
+    joints: (J, 3) m, posed, camera frame; focal: focal length over the picture's height, px.
+    """
+    return float(focal * stature / np.linalg.norm(joints, axis=1).min())
 
 
 def measure_losses(level: Candidate, finer: Candidate) -> np.ndarray:
