@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from gsac.avatar.wholebody import BODY, FACE, FEET, LEFT_HAND, RIGHT_HAND
+from gsac.stages.first_look import BODY_SPAN
 
 BY_GROUP = ((BODY, 0.010), (FEET, 0.010), (FACE, 0.005), (LEFT_HAND, 0.005), (RIGHT_HAND, 0.005))
 """Standard deviation at full score, as a fraction of the person's height; measured for the embedded detectors on rendered truth."""
 LEAST_SCORE = 0.1
 """Lower scores give no larger sigma."""
-BODY_SPAN = 0.9
-"""Eyes to ankles, as a part of the height."""
 
 
 def person_height(xy: np.ndarray, score: np.ndarray) -> float:
