@@ -48,6 +48,17 @@ class Shot(NamedTuple):
     """x, y in the whole frame, px."""
 
 
+class SideShot(NamedTuple):
+    """The body of a frame, turned: a side that no frame shows, which teaches the gaussians' outline alone."""
+
+    frame: int
+    """Its index among the shots."""
+    turn: np.ndarray
+    """(3, 3), about the pelvis."""
+    shot: Shot
+    """Without a picture."""
+
+
 class OnFaces(Protocol):
     """Gaussians of any recipe, as far as all trainers know them."""
 

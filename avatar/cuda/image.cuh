@@ -38,7 +38,7 @@ FORMULA float4 render_at(const Scene &s, const Place &p, int x, int y) {
     return ((const float4 *)s.image)[size_t(p.b) * s.max_pixels + y * p.width + x];
 }
 
-// Render, in the frame's exposure, and target over the batch's background.
+// Render, in the frame's exposure, and target over the batch's background. A side has its own outline for a mask, and no target.
 FORMULA Pixel pixel_of(const Scene &s, const Place &p, int x, int y) {
     const Now &now = s.now[p.b];
     const float byte = 1 / 255.0f;
@@ -53,7 +53,17 @@ FORMULA Pixel pixel_of(const Scene &s, const Place &p, int x, int y) {
                  now.gain[2] * render.z + clear * now.background[2]};
     out.target = {true_pixel.x * byte + clear_target * now.background[0], true_pixel.y * byte + clear_target * now.background[1],
                   true_pixel.z * byte + clear_target * now.background[2]};
+    if (now.frame.sharp > 0) {
+        out.mask = out.alpha > 0.5f ? 1 : 0;
+        out.target = out.image;
+    }
     return out;
+}
+
+// Weight of the L2 between alpha and mask.
+FORMULA float mask_weight(const Scene &s, const Place &p) {
+    float sharp = s.now[p.b].frame.sharp;
+    return sharp > 0 ? sharp : s.mask;
 }
 
 // Weight of a channel of a pixel in the mean that the losses are.
@@ -124,7 +134,7 @@ extern "C" __global__ void __launch_bounds__(PIXELS) compare(Scene s) {
                 if (r >= REACH && c >= REACH && r < REACH + TILE && c < REACH + TILE) {
                     float dx = pixel.image.x - pixel.target.x, dy = pixel.image.y - pixel.target.y;
                     float dz = pixel.image.z - pixel.target.z, da = pixel.alpha - pixel.mask;
-                    loss += share * (dx * dx + dy * dy + dz * dz) + 3 * share * s.mask * da * da;
+                    loss += share * (dx * dx + dy * dy + dz * dz) + 3 * share * mask_weight(s, p) * da * da;
                     shown += pixel.alpha;
                     masked += pixel.mask;
                     both += pixel.alpha * pixel.mask;
@@ -349,10 +359,10 @@ extern "C" __global__ void __launch_bounds__(PIXELS) image_gradient(Scene s) {
                 for (int k = 0; k < 3; ++k)
                     lpips[k] = s.perceptual * s.window_slope[3 * ((size_t(p.b) * s.window_height + wy) * s.window_width + wx) + k];
         }
-        float4 out = {0, 0, 0, 6 * share * s.mask * (pixel.alpha - pixel.mask)};
+        float4 out = {0, 0, 0, 6 * share * mask_weight(s, p) * (pixel.alpha - pixel.mask)};
         if (s.dice_weight > 0) out.w += s.dice[0] * (1 - pixel.mask);
         for (int k = 0; k < 3; ++k) {
-            grad[k] = seen * (grad[k] + 2 * share * (image[k] - target[k])) + lpips[k] + sobel[k];
+            grad[k] = now.frame.sharp > 0 ? 0 : seen * (grad[k] + 2 * share * (image[k] - target[k])) + lpips[k] + sobel[k];
             out.w -= grad[k] * now.background[k];
         }
         out.x = now.gain[0] * grad[0];

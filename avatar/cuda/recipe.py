@@ -14,6 +14,9 @@ FROM_CONFIG = ("seed", "mu_rate", "rgb_rate", "quat_rate", "scale_rate", "opacit
                "joint_rate", "ssim", "sobel", "mask", "needle", "reach", "place_pull")
 """Fields of a recipe that a configuration has by the same name."""
 
+OF_FRAMES = ("pose", "offset", "betas", "gain", "expression", "joints")
+"""Rates of what only frames teach."""
+
 
 @dataclass(kw_only=True)
 class Recipe:
@@ -86,6 +89,10 @@ class Recipe:
     """Weight of LPIPS, of a window of one of a step's frames, where the trainer is given a network; as a mean over the frames."""
     perceptual_steps: int = 0
     """Steps, the last, that have LPIPS in the loss."""
+    sides: np.ndarray | None = None
+    """(steps,) int, index of the side that a step is made on, -1 for a frame; None: all are made on frames."""
+    sharp: float = 0.0
+    """Weight of the L2 between alpha and its own outline, on a side."""
     frame_size: tuple[int, int] = (0, 0)
     """Width and height of the whole frame that the shots are cropped from, px."""
 
@@ -99,7 +106,7 @@ class Recipe:
 
 class DrawnPlan(NamedTuple):
     order: np.ndarray
-    """(steps, batch) int32, indices of frames; no frame twice in a step."""
+    """(steps, batch) int32, indices of frames, no frame twice in a step; those of sides follow those of frames."""
     background: np.ndarray
     """(steps, batch, 3) float32 in 0..1."""
     rates: np.ndarray
@@ -112,14 +119,18 @@ def draw_plan(recipe: Recipe, frames: int, levels: int) -> DrawnPlan:
     random = np.random.default_rng(recipe.seed)
     order, background = np.empty((recipe.steps, batch), np.int32), np.empty((recipe.steps, batch, 3), np.float32)
     left: list[int] = []
+    sides = np.full(recipe.steps, -1) if recipe.sides is None else recipe.sides
     for step in range(recipe.steps):
-        if len(left) < batch:
+        if sides[step] < 0 and len(left) < batch:
             left = list(random.permutation(frames))
         for b in range(batch):
-            order[step, b] = left.pop()
+            order[step, b] = left.pop() if sides[step] < 0 else frames + sides[step]
             background[step, b] = random.random(3)
     done = recipe.begin + (1 - recipe.begin) * np.arange(recipe.steps) / max(recipe.steps, 1)
-    return DrawnPlan(order, background, rates_of(recipe, done, levels))
+    rates = rates_of(recipe, done, levels)
+    for name in OF_FRAMES:
+        rates[name][sides >= 0] = 0
+    return DrawnPlan(order, background, rates)
 
 
 def zero_rates(steps: int) -> np.ndarray:

@@ -9,9 +9,9 @@ _NAMES = {INT: "int", FLOAT: "float", DOUBLE: "double", LONG: "long long"}
 MOST_BATCH = 16
 
 FRAME = {"pixels": LONG, "tiles": INT, "width": INT, "height": INT, "fx": FLOAT, "fy": FLOAT, "cx": FLOAT, "cy": FLOAT, "rest": INT,
-         "pose": INT, "left": INT, "top": INT, "spare": INT}
+         "pose": INT, "left": INT, "top": INT, "sharp": FLOAT}
 """pixels, tiles: where the frame's pixels and tile flags begin; rest, pose: indices of its vertices at rest and of its pose;
-left, top: px, its corner in the whole frame."""
+left, top: px, its corner in the whole frame; sharp: 0, or of a side that no frame shows, the weight of its outline."""
 
 PLAN = {"level": INT, "mu": FLOAT, "quat": FLOAT, "log_scale": FLOAT, "rgb": FLOAT, "opacity": FLOAT, "pose": FLOAT,
         "place_pull": FLOAT, "offset": FLOAT, "betas": FLOAT, "gain": FLOAT, "expression": FLOAT, "joints": FLOAT, "centre": INT,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from gsac.avatar.cuda.arrays import JOINTS, TILE, Arrays, BodyArrays, OnFaces, Shot
+from gsac.avatar import rotation
+from gsac.avatar.cuda.arrays import JOINTS, TILE, Arrays, BodyArrays, OnFaces, Shot, SideShot
 from gsac.avatar.cuda.device import Device
 from gsac.avatar.cuda.recipe import DrawnPlan, Recipe, draw_plan
 from gsac.avatar.cuda.structs import State
@@ -28,14 +30,16 @@ class CudaTrainer:
 
     def __init__(self, body: BodyArrays, levels: list[list[Shot]], pose: np.ndarray, transl: np.ndarray, gaussians: OnFaces,
                  recipe: Recipe, device: Device | None = None, pair_room: int | None = None,
-                 network: FeatureDistance | None = None):
+                 network: FeatureDistance | None = None, sides: Sequence[SideShot] = ()):
         """levels: one or two lists of T shots, coarse first; pose: (T, 55, 3) rad; transl: (T, 3) m.
 
         pair_room: (tile, gaussian) pairs that there is memory for at first; network: for LPIPS in the loss of the recipe's last
-        `perceptual_steps`, by torch.
+        `perceptual_steps`, by torch; sides: those of the recipe's `sides`.
         """
         self.device = device or Device()
-        self.recipe, self.body, self.face = recipe, body, np.asarray(gaussians.face, np.int32)
+        self.sides, shown_by = sides, [side.frame for side in sides]
+        self.recipe, self.face = recipe, np.asarray(gaussians.face, np.int32)
+        self.body = body._replace(rest_of=np.append(body.rest_of, np.asarray(body.rest_of)[shown_by]).astype(int))
         self.frames, self.count, self.light, self.low_pass = len(levels[0]), len(gaussians), gaussians.light, gaussians.low_pass
         self.arrays = Arrays(self.device.stream)
         self.buffers, self.scene = self.arrays.buffers, self.arrays.scene
@@ -45,6 +49,7 @@ class CudaTrainer:
         self._clock = self.device.event(), self.device.event()
         drawn = self.plan(len(levels))
         self.batch, self.order, self.rates = drawn.order.shape[1], drawn.order, drawn.rates
+        levels = [[*level, *(side.shot for side in sides)] for level in levels]
         self._numbers(levels)
         self.windows, self.late = None, recipe.steps
         if network is not None and recipe.perceptual_steps:
@@ -66,7 +71,7 @@ class CudaTrainer:
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Pose (T, 55, 3) rad and translation (T, 3) m, float64."""
-        both = self.buffers["pose"].read()
+        both = self.buffers["pose"].read()[:self.frames]
         return both[:, :JOINTS].copy(), both[:, JOINTS].copy()
 
     def betas(self) -> np.ndarray:
@@ -75,7 +80,7 @@ class CudaTrainer:
 
     def expressions(self) -> np.ndarray:
         """(T, E) float64, learned on top of the expressions that are in the rest vertices."""
-        return self.buffers["expression"].read()
+        return self.buffers["expression"].read()[:self.frames]
 
     def joint_offset(self) -> np.ndarray:
         """(55, 3) float64 m, learned on top of the joints at rest."""
@@ -83,7 +88,7 @@ class CudaTrainer:
 
     def gains(self) -> np.ndarray:
         """(T, 3), one for each of a frame's colour channels; 1 where none are learned."""
-        return self.buffers["gain"].read()
+        return self.buffers["gain"].read()[:self.frames]
 
     def offset(self) -> np.ndarray:
         """(V, 3) m, the learned displacement of the vertices at rest, without that by betas."""
@@ -155,12 +160,21 @@ class CudaTrainer:
 
     def place(self, pose: np.ndarray, transl: np.ndarray) -> None:
         """Sets the poses to go on from, and to be pulled to, with empty moments. pose: (T, 55, 3) rad; transl: (T, 3) m."""
-        both = np.concatenate([pose, transl[:, None]], 1)
+        turns, shifts = self._with_sides(pose, transl)
+        both = np.concatenate([turns, shifts[:, None]], 1)
         for name in ("pose", "fit"):
             self.buffers[name].write(both)
         for name in ("pose_first", "pose_second", "pose_steps", "expression_first", "expression_second"):
             if name in self.buffers:
                 self.buffers[name].fill(0)
+
+    def _with_sides(self, pose: np.ndarray, transl: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The poses with those of the sides behind them. pose: (T, 55, 3) rad; transl: (T, 3) m."""
+        shown_by = [side.frame for side in self.sides]
+        turned = np.array(pose[shown_by], np.float64)
+        if self.sides:
+            turned[:, 0] = rotation.log(np.stack([side.turn for side in self.sides]) @ rotation.exp(turned[:, 0]))
+        return np.concatenate([pose, turned]), np.concatenate([transl, transl[shown_by]])
 
     def wear(self, rest: np.ndarray) -> None:
         """Sets the frames' vertices at rest, in other expressions. rest: (R, V, 3) m, of as many shapes as the body came with."""
@@ -198,7 +212,7 @@ class CudaTrainer:
     def shot_size(self, step: int) -> tuple[int, int]:
         """Height and width of the first frame of a step."""
         level = self.rates["level"][step]
-        return self.sizes[level * self.frames + self.order[step, 0]]
+        return self.sizes[level * self.scene.frame_count + self.order[step, 0]]
 
     def want_gradients(self) -> None:
         """From now on the buffers `grad_out` (N, 14) and `pose_grad_out` (batch, 56, 3) hold the last step's gradients."""
@@ -209,11 +223,12 @@ class CudaTrainer:
     def _upload(self, levels: list[list[Shot]], drawn: DrawnPlan, pose: np.ndarray, transl: np.ndarray,
                 gaussians: OnFaces) -> None:
         arrays = self.arrays
-        upload_shots(arrays, levels, self.body.rest_of)
+        sharp = np.where(np.arange(len(levels[0])) < self.frames, 0, self.recipe.sharp)
+        upload_shots(arrays, levels, self.body.rest_of, sharp)
         arrays.upload("plan", drawn.rates.view(np.uint8), np.uint8)
         arrays.upload("order", drawn.order, np.int32)
         arrays.upload("background", drawn.background, np.float32)
-        upload_body(arrays, self.body, self.recipe, pose, transl)
+        upload_body(arrays, self.body, self.recipe, *self._with_sides(pose, transl))
         self._upload_gaussians(self._values(gaussians))
         arrays.allocate("losses", (self.recipe.steps, self.batch), np.float32).fill(0)
         arrays.allocate("state", ctypes.sizeof(State), np.uint8).fill(0)
@@ -234,7 +249,7 @@ class CudaTrainer:
         """Sizes and weights in the scene."""
         recipe, scene = self.recipe, self.scene
         self.sizes = sizes = [shot.pixels.shape[:2] for level in levels for shot in level]
-        scene.frame_count, scene.batch, scene.count = self.frames, self.batch, self.count
+        scene.frame_count, scene.batch, scene.count = len(levels[0]), self.batch, self.count
         scene.vertex_count = self.body.rest.shape[1]
         scene.low_pass_px2, scene.low_pass_energy = self.low_pass.px2, self.low_pass.keeps_energy
         scene.max_pixels = max(h * w for h, w in sizes)

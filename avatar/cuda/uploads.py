@@ -18,14 +18,17 @@ NOW = 256
 """Bytes kept for each frame of the batch's `Now`; at least the struct's."""
 
 
-def upload_shots(arrays: Arrays, levels: list[list[Shot]], rest_of: np.ndarray) -> None:
-    """Pixels and cameras of levels of T shots, and which of their tiles show the person. rest_of: (T,) as in BodyArrays."""
+def upload_shots(arrays: Arrays, levels: list[list[Shot]], rest_of: np.ndarray, sharp: np.ndarray) -> None:
+    """Pixels and cameras of levels of T shots, and which of their tiles show the person.
+
+    rest_of: (T,) as in BodyArrays; sharp: (T,) as in `structs.FRAME`.
+    """
     frames = np.zeros(len(levels) * arrays.scene.frame_count, [(name, np.dtype(kind)) for name, kind in FRAME.items()])
     places = []
     at = tiles = 0
     for i, (t, shot) in enumerate((t, shot) for level in levels for t, shot in enumerate(level)):
         h, w = shot.pixels.shape[:2]
-        frames[i] = (at, tiles, w, h, *shot.camera.focal, *shot.camera.center, rest_of[t], t, *shot.corner, 0)
+        frames[i] = (at, tiles, w, h, *shot.camera.focal, *shot.camera.center, rest_of[t], t, *shot.corner, sharp[t])
         places.append((shot.pixels, at, tiles))
         at, tiles = at + h * w, tiles + -(-h // TILE) * -(-w // TILE)
     pixels, occupied = np.empty((at, 4), np.uint8), np.zeros(tiles, np.uint8)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
 
 import numpy as np
 
-from gsac.avatar.cuda.arrays import BodyArrays, Shot
+from gsac.avatar.cuda.arrays import BodyArrays, Shot, SideShot
 from gsac.avatar.cuda.device import DeviceError
 from gsac.avatar.cuda.kernels import CompileError
 from gsac.avatar.cuda.paper import PaperGaussians, PaperRecipe
@@ -20,6 +20,7 @@ from gsac.avatar.joints import JAW
 from gsac.stages.contract import StageError
 from gsac.stages.train.finite import require_finite
 from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.poses.unseen_sides import Side
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
 
@@ -31,22 +32,29 @@ Kind = TypeVar("Kind", bound=CudaTrainer)
 
 @contextmanager
 def open_trainer(kind: type[Kind], poses: Poses, frames: np.ndarray, levels: list[dict[int, View]],
-                 gaussians: Gaussians | PaperGaussians, recipe: Recipe, network: FeatureDistance | None = None) -> Iterator[Kind]:
+                 gaussians: Gaussians | PaperGaussians, recipe: Recipe, network: FeatureDistance | None = None,
+                 sides: Sequence[Side] = ()) -> Iterator[Kind]:
     """A trainer over frames, (n,) indices, that is closed at the end. Raises StageError where the GPU fails.
 
-    levels: frame -> view, coarse first; network: for the loss.
+    levels: frame -> view, coarse first; network: for the loss; sides: those of the recipe, of bodies of `frames`.
     """
     trainer = None
     try:
-        shots = [[Shot(view.pixels, view.camera, view.corner) for view in (views[int(t)] for t in frames)] for views in levels]
+        shots = [[make_shot(views[int(t)]) for t in frames] for views in levels]
+        turned = [SideShot(int(np.flatnonzero(frames == t)[0]), turn, make_shot(view)) for t, turn, view in sides]
         trainer = kind(body_arrays(poses, frames, recipe), shots, poses.pose[frames], poses.transl[frames], gaussians,
-                       recipe, network=network)
+                       recipe, network=network, sides=turned)
         yield trainer
     except (DeviceError, CompileError) as error:
         raise StageError(f"train on the GPU: {error}; or set train.device to cpu") from error
     finally:
         if trainer is not None:
             trainer.close()
+
+
+def make_shot(view: View) -> Shot:
+    """The view, as the GPU's trainer takes it."""
+    return Shot(view.pixels, view.camera, view.corner)
 
 
 def body_arrays(poses: Poses, frames: np.ndarray, recipe: Recipe) -> BodyArrays:

@@ -17,6 +17,7 @@ from gsac.stages.train.gaussians.coarser import Coarser
 from gsac.stages.train.gaussians.facial_features import density_on_head
 from gsac.stages.train.gaussians.joint_limits import density_where_grown, find_growth
 from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.poses.unseen_sides import Side, find_sides
 from gsac.stages.train.views import View
 
 LPIPS_WEIGHT = 0.01
@@ -61,6 +62,12 @@ class Task:
     def density(self) -> np.ndarray:
         """(F,) factors of the density of gaussians that the body asks for, as fitted: where joints bend, and on the head."""
         return density_where_grown(self.growth) * density_on_head(self.poses.body, self.poses.betas)
+
+    @cached_property
+    def sides(self) -> list[Side]:
+        """Sides that no trained frame shows, at half the size of the views."""
+        camera = self.views[int(self.trained[0])].frame
+        return find_sides(self.poses, self.trained, camera.scaled(max(1, camera.width // 2), max(1, camera.height // 2)))
 
 
 @dataclass

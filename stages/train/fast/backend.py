@@ -65,7 +65,8 @@ class Backend(ABC):
               coarse: dict[int, View] | None = None) -> Trainer:
         """Fits merged gaussians anew at a pace; poses and unseen gaussians stay.
 
-        views: trained frame -> view; coarse: the same at half the size for the first steps, where they shall be coarse.
+        views: trained frame -> view; coarse: the same at half the size for the first steps, where they shall be coarse: then sides
+        that no frame shows are looked at, too.
         """
 
     @abstractmethod

@@ -23,8 +23,29 @@ from gsac.stages.train.poses.bundle_adjust import Equations, FrameEquations, cor
 from gsac.stages.train.poses.expressions import correct_expressions
 from gsac.stages.train.poses.own_errors import correct_each, newton_steps
 from gsac.stages.train.poses.poses import Poses
+from gsac.stages.train.poses.unseen_sides import Side, side_at
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View, Views, of_each
+
+
+class Draws:
+    """What each step is made on, and over which colour: frames in rounds, every one once a round, and sides in between."""
+
+    def __init__(self, task: Task, sides: list[Side]):
+        self.trained, self.sides = task.trained, sides
+        self.rng = np.random.default_rng(task.config.seed)
+        self.order: list[int] = []
+        """Frames still to come in this round."""
+
+    def step(self, number: int, done: float, views: dict[int, View]) -> Step:
+        """The next step. done: share of the training that its rates have behind them; views: frame -> view."""
+        at = side_at(number, done, len(self.sides))
+        if at is not None:
+            t, turn, view = self.sides[at]
+            return Step(t, view, done, self.rng.random(3), number, turn)
+        self.order = self.order or [int(t) for t in self.rng.permutation(self.trained)]
+        t = self.order.pop()
+        return Step(t, views[t], done, self.rng.random(3), number)
 
 
 class Cpu(Backend):
@@ -38,18 +59,17 @@ class Cpu(Backend):
         What changes midway does so before the first step, of those side by side, that is due.
         """
         config = task.config
-        rng = np.random.default_rng(config.seed)
+        draws = Draws(task, task.sides)
         fine = crop_views(task)
         coarse = of_each(View.halved, fine)
         steps = config.steps or FAST_STEPS[self.device]
         coarse_until = coarse_steps(person_pixels(task), steps)
-        order: list[int] = []
         mean = MeanOfSteps()
         if task.resumed is None:
             trainer, first = Trainer(init_gaussians(task, coarse, count), task), 0
         else:
             trainer, first = Trainer.from_state(task.resumed["trainer"], task), task.resumed["step"]
-            order, rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
+            draws.order, draws.rng.bit_generator.state = task.resumed["order"], task.resumed["rng"]
             mean.restore(task.resumed["mean"])
             task.resumed = None
         corrections, mean_from = correction_steps(config, steps, self.device, AT_ONCE), averaged_from(steps, self.device)
@@ -59,17 +79,14 @@ class Cpu(Backend):
             if trainer.offsets and step / steps >= OFFSET_SHARE:
                 trainer.fold_offsets()
                 trainer.lay_unseen(coarse)
-            these: list[Step] = []
-            for number in range(step, min(step + AT_ONCE, steps)):
-                order = order or [int(t) for t in rng.permutation(task.trained)]
-                t = order.pop()
-                these.append(Step(t, (coarse if number < coarse_until else fine)[t], number / steps, rng.random(3), number))
+            these = [draws.step(number, number / steps, coarse if number < coarse_until else fine)
+                     for number in range(step, min(step + AT_ONCE, steps))]
             for done, loss in enumerate(trainer.learn(these), step + 1):
                 task.checkpoint(done, steps, loss, trainer.gaussians)
             done = step + len(these)
             if done > mean_from:
                 mean.add(trainer.values)
-            task.keep(done, steps, partial(loop_state, done, order, rng, trainer, mean))
+            task.keep(done, steps, partial(loop_state, done, draws.order, draws.rng, trainer, mean))
             task.progress(done, steps, "steps")
         trainer.values = mean.values()
         if trainer.offsets:
@@ -81,21 +98,16 @@ class Cpu(Backend):
     def refit(self, task: Task, trainer: Trainer, views: dict[int, View], pace: Pace,
               coarse: dict[int, View] | None = None) -> Trainer:
         """As `Backend.refit`, in the trainer itself."""
-        rng = np.random.default_rng(task.config.seed)
+        draws = Draws(task, task.sides if coarse else [])
         trainer.config = refit_config(task.config, pace)
-        order: list[int] = []
         steps = refit_steps(task.config, pace)
         averaged, mean = max(1, round(pace.averaged * steps / AT_ONCE)), MeanOfSteps()
         coarse_until = round(coarse_share(person_pixels(task)) * steps) if coarse else 0
         begins = range(0, steps, AT_ONCE)
         for begin in begins:
-            these: list[Step] = []
-            for number in range(begin, min(begin + AT_ONCE, steps)):
-                order = order or [int(t) for t in rng.permutation(task.trained)]
-                t = order.pop()
-                shown = coarse if coarse and number < coarse_until else views
-                these.append(Step(t, shown[t], pace.begin + (1 - pace.begin) * number / steps, rng.random(3), number))
-            trainer.learn(these)
+            trainer.learn([draws.step(number, pace.begin + (1 - pace.begin) * number / steps,
+                                      coarse if coarse and number < coarse_until else views)
+                           for number in range(begin, min(begin + AT_ONCE, steps))])
             if begin in begins[-averaged:]:
                 mean.add(trainer.values)
         trainer.free_buffers()

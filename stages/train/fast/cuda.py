@@ -38,6 +38,7 @@ from gsac.stages.train.poses.bundle_adjust import Equations
 from gsac.stages.train.poses.expressions import correct_expressions
 from gsac.stages.train.poses.photometric import CURVATURE, NormalEquations, joint_shares
 from gsac.stages.train.poses.poses import HAND_SHARE, JOINT, SHIFT, TURN, Poses
+from gsac.stages.train.poses.unseen_sides import SHARP, side_at
 from gsac.stages.train.task import LPIPS_WEIGHT, Task
 from gsac.stages.train.views import View, Views, of_each, person_crop
 
@@ -62,8 +63,10 @@ class Cuda(Backend):
         gaussians = init_gaussians(task, coarse, count)
         steps = task.config.steps or FAST_STEPS["cuda"]
         recipe = make_recipe(task.config, count, coarse_share=coarse_steps(schedule.person_pixels(task), steps) / steps,
-                             least=schedule.shortest_axis(task), **limits_at_joints(task, count), **lpips_options(task))
-        with (open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network) as trainer,
+                             least=schedule.shortest_axis(task), **limits_at_joints(task, count), **lpips_options(task),
+                             **looks_at_sides(task, steps))
+        with (open_trainer(CudaTrainer, task.poses, task.trained, [coarse, fine], gaussians, recipe, task.network,
+                           task.sides) as trainer,
               self.open_equations(task, gaussians, coarse) as equations):
             self.train_correcting(trainer, task, [coarse, fine], equations, math.ceil(recipe.offset_share * recipe.steps))
             body = trainer.body
@@ -83,14 +86,16 @@ class Cuda(Backend):
         """As `Backend.refit`, without the mean of the last steps."""
         gaussians = trainer.gaussians()
         share = pace.begin + (1 - pace.begin) * coarse_share(schedule.person_pixels(task)) if coarse else 0.0
-        recipe = make_recipe(refit_config(task.config, pace), len(gaussians), steps=refit_steps(task.config, pace),
-                             begin=pace.begin, coarse_share=share, offset_rate=0.0, least=trainer.least, **POSES_STAY,
-                             **lpips_options(task))
+        steps, looks = refit_steps(task.config, pace), {}
+        if coarse:
+            looks = looks_at_sides(task, steps, pace.begin)
+        recipe = make_recipe(refit_config(task.config, pace), len(gaussians), steps=steps, begin=pace.begin, coarse_share=share,
+                             offset_rate=0.0, least=trainer.least, **POSES_STAY, **lpips_options(task), **looks)
         first = int(task.trained[0])
         whole = views[first].camera.focal == task.views[first].camera.focal  # smaller images of coarser levels have no windows
         network = task.network if whole else None
         with open_trainer(CudaTrainer, task.poses, task.trained, [coarse, views] if coarse else [views], gaussians, recipe,
-                          network) as on_gpu:
+                          network, task.sides if coarse else ()) as on_gpu:
             on_gpu.replace(gaussians, ~trainer.seen, trainer.reach)
             on_gpu.train(recipe.steps)
             kept = take_over(on_gpu, task)
@@ -205,6 +210,12 @@ def limits_at_joints(task: Task, count: int) -> dict[str, Any]:
     """Fields of a recipe for the limits of `count` gaussians where joints bend, for `make_recipe`."""
     longest, tied = limit_where_grown(task.growth, schedule.longest_axis(task.config, count))
     return {"largest": longest, "tied": tied, "tie": TIE}
+
+
+def looks_at_sides(task: Task, steps: int, begin: float = 0.0) -> dict[str, Any]:
+    """Fields of a recipe for the task's sides, for `make_recipe`. begin: share of a training that the first step has behind it."""
+    found = [side_at(number, begin + (1 - begin) * number / steps, len(task.sides)) for number in range(steps)]
+    return {"sides": np.array([-1 if side is None else side for side in found]), "sharp": SHARP}
 
 
 def lpips_options(task: Task) -> dict[str, Any]:

@@ -4,9 +4,9 @@ Two steps are worked out side by side, both from the gaussians as they stand, th
 to keep several cores busy with one, and a gradient that is late by one step teaches the same.
 
 One gaussian budget from the start, no densification; half the size first; rates that decay; all poses corrected together before
-the steps (`prealign`) and midway (`bundle_adjust`), each by itself from then on (`own_errors`, `newton`). Gaussians
-are limited after every step instead of being penalised in the loss: no needle, no giant and no floater can arise, whatever the
-weights.
+the steps (`prealign`) and midway (`bundle_adjust`), each by itself from then on (`own_errors`, `newton`). Late steps also keep
+outlines sharp from sides that no frame shows (`unseen_sides`). Gaussians are limited after every step instead of being penalised
+in the loss: no needle, no giant and no floater can arise, whatever the weights.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from gsac.stages.train.gaussians.kernels import adam_rows, count_rows, limit, on
 from gsac.stages.train.gaussians.shown import find_seen, front_pixels
 from gsac.stages.train.gaussians.unseen import colour_unseen, flatten_unseen
 from gsac.stages.train.poses.guessed_limbs import find_guessed_faces
+from gsac.stages.train.poses.unseen_sides import SHARP, turned_vertices
 from gsac.stages.train.task import Task
 from gsac.stages.train.views import View
 
@@ -65,6 +66,8 @@ class Step(NamedTuple):
     background: np.ndarray
     """(3,) in 0..1."""
     number: int
+    turn: np.ndarray | None = None
+    """(3, 3) of a side that no frame shows: it teaches the gaussians' outline alone."""
 
 
 class StepGradients(NamedTuple):
@@ -147,9 +150,7 @@ class Trainer:
 
     def gaussians(self) -> Gaussians:
         """A copy of the gaussians as they stand."""
-        v = self.values
-        return Gaussians(self.face, v["mu"].copy(), v["quat"].copy(), v["log_scale"].copy(), v["rgb"].copy(),
-                         sigmoid(v["opacity_logit"][:, 0]), self.light, self.low_pass)
+        return self._as_they_stand()[np.arange(len(self.face))]
 
     def learn(self, steps: list[Step]) -> list[float]:
         """Steps, at most `AT_ONCE`, each by the gradient of the values before the first of them. Returns their losses."""
@@ -158,6 +159,8 @@ class Trainer:
         Workspace().share(self._advance, steps, gradients)
         if self.config.exposure:
             for step, grads in zip(steps, gradients, strict=True):
+                if step.turn is not None:
+                    continue
                 gain = self.gains.get(step.frame, np.ones(3))
                 self.gains[step.frame] = np.clip(gain - GAIN_RATE * np.sign(grads.gain) * 0.1**step.done, 0.5, 2).astype(np.float64)
         require_finite(f"after step {steps[-1].number}", self.values | {"offset of the surface": self.poses.offset} |
@@ -174,7 +177,7 @@ class Trainer:
         if workers > 1 and not self.frozen_body:
             worker, workers = worker - 1, workers - 1
         for step, grads in zip(steps, gradients, strict=True):
-            if moves_body:
+            if moves_body and step.turn is None:
                 self._move_body(step.frame, grads.vertices, step.done)
             if worker >= 0:
                 self._move(worker, workers, grads.values, step.done)
@@ -189,13 +192,13 @@ class Trainer:
             self.poses.offset = self.offsets.offset
 
     def gradients(self, step: Step, room: Room) -> StepGradients:
-        """Of the loss of a frame; they lie in the room's buffers."""
-        config, v, t, view = self.config, self.values, step.frame, step.view
+        """Of the loss of a frame, or of a side's outline; they lie in the room's buffers."""
+        if step.turn is not None:
+            return self._outline_gradients(step, step.turn, room)
+        config, t, view = self.config, step.frame, step.view
         share, take = room.drawing.share, room.losses.take
-        vertices = self.poses.vertices(t)
-        shown = Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity_logit"][:, 0]), self.light,
-                          self.low_pass)
-        rendering = render_bound(vertices, self.faces, shown, view.camera, room.drawing)
+        shown = self._as_they_stand()
+        rendering = render_bound(self.poses.vertices(t), self.faces, shown, view.camera, room.drawing)
         background, gain = step.background.astype(np.float32), self.gains.get(t, np.ones(3)).astype(np.float32)
         real = rendering.rgb.dtype
         image, target, grad_rgb = (take(name, rendering.rgb.shape, real) for name in ("image", "target", "grad_rgb"))
@@ -211,6 +214,24 @@ class Trainer:
         if t in self.guessed:
             self._forget_guessed(t, by_name, grads.vertices)
         return StepGradients(float(loss), by_name, grads.vertices, grad_gain)
+
+    def _outline_gradients(self, step: Step, turn: np.ndarray, room: Room) -> StepGradients:
+        """Of the L2 between alpha, seen from a side, and its own outline. turn: (3, 3), the step's."""
+        shown = self._as_they_stand()
+        rendering = render_bound(turned_vertices(self.poses, step.frame, turn), self.faces, shown, step.view.camera, room.drawing)
+        off = rendering.alpha - (rendering.alpha > 0.5)
+        grad_rgb = room.losses.take("grad_rgb", rendering.rgb.shape, rendering.rgb.dtype)
+        grad_rgb[:] = 0
+        grads = render_bound_backward(rendering.state, grad_rgb, off * rendering.alpha.dtype.type(2 * SHARP / off.size))
+        loss = SHARP * float(np.mean(off**2))
+        require_finite(f"at step {step.number}", {"loss": loss, **named_gradients(grads)})
+        return StepGradients(loss, self._by_name(grads, shown.opacity), grads.vertices, np.zeros(3))
+
+    def _as_they_stand(self) -> Gaussians:
+        """The gaussians, whose places, turns, sizes and colours are the trainer's own."""
+        v = self.values
+        return Gaussians(self.face, v["mu"], v["quat"], v["log_scale"], v["rgb"], sigmoid(v["opacity_logit"][:, 0]), self.light,
+                         self.low_pass)
 
     def fold_offsets(self) -> None:
         """Moves the body's displacement into the gaussians: from here on they are bound to the plain body."""

@@ -53,6 +53,19 @@ def test_the_plan_draws_what_the_cpu_recipe_draws():
     np.testing.assert_allclose(drawn.rates["mu"], 1.5e-3 * 0.01 ** (np.arange(30) / 30), rtol=1e-6)
 
 
+def test_steps_on_sides_take_no_frame_from_the_round_and_teach_nothing_that_only_frames_tell():
+    sides = np.where(np.arange(30) % 3 == 2, np.arange(30) // 3 % 4, -1)
+    told = {"pose_rate": 1e-3, "gain_rate": 1e-3, "joint_rate": 1e-4, "offset_rate": 1e-3, "mu_rate": 1e-3}
+    drawn, plain = (draw_plan(Recipe(steps=30, seed=5, sides=given, **told), 7, 1) for given in (sides, None))
+    looks = sides >= 0
+    np.testing.assert_array_equal(drawn.order[looks, 0], 7 + sides[looks])
+    for name in ("pose", "gain", "joints", "offset"):
+        assert (drawn.rates[name][looks] == 0).all() and (drawn.rates[name][~looks] > 0).all()
+    np.testing.assert_array_equal(drawn.rates["mu"], plain.rates["mu"])
+    on_frames = drawn.order[~looks, 0]
+    assert all(len(set(on_frames[k:k + 7])) == 7 for k in range(0, 14, 7))
+
+
 def test_a_recipe_that_is_told_nothing_learns_nothing_counts_nothing_and_limits_nothing():
     plain = Recipe(steps=3)
     drawn = draw_plan(plain, 2, 1)

@@ -233,3 +233,59 @@ def test_single_frames_are_corrected_as_on_the_cpu():
     (turns, shifts), (expected_turns, expected_shifts) = moved
     assert np.abs(expected_shifts[task.trained]).max() > 1e-4
     assert relative(turns, expected_turns) < 0.01 and relative(shifts, expected_shifts) < 0.01
+
+
+def test_steps_on_sides_that_no_frame_shows_move_gaussians_as_on_the_cpu(one_at_a_time):
+    from gsac.avatar.cuda.trainer import CudaTrainer
+    from gsac.benchmarks.gpu.check import relative
+    from gsac.stages.train.fast.cuda import POSES_STAY, make_recipe
+    from gsac.stages.train.fast.initial_gaussians import init_gaussians
+    from gsac.stages.train.fast.schedule import shortest_axis
+    from gsac.stages.train.fast.trainer import Step, Trainer
+    from gsac.stages.train.gpu import open_trainer
+    from gsac.stages.train.poses.unseen_sides import SHARP
+
+    task, steps = turning(range(4, 12), size=(160, 240), steps=24, gaussians=2000), 24
+    views = {int(t): task.views[int(t)] for t in task.trained}
+    gaussians = init_gaussians(task, views, 2000)
+    cpu, looks = Trainer(gaussians, task, frozen_body=True), np.arange(steps) % len(task.sides)
+    recipe = make_recipe(task.config, 2000, steps=steps, offset_rate=0.0, least=shortest_axis(task), sides=looks, sharp=SHARP,
+                         **POSES_STAY)
+    losses = []
+    for number, at in enumerate(looks):
+        t, turn, view = task.sides[at]
+        losses += cpu.learn([Step(t, view, number / steps, np.ones(3), number, turn)])
+    with open_trainer(CudaTrainer, task.poses, task.trained, [views], gaussians, recipe, None, task.sides) as cuda:
+        cuda.train(steps)
+        got, ours, pose = cuda.losses()[:, 0], cuda.gaussians(), cuda.poses()[0]
+    theirs = cpu.gaussians()
+    np.testing.assert_allclose(got, losses, rtol=0.02)
+    for name, apart in (("mu", 0.05), ("log_scale", 0.05), ("quat", 0.15)):  # they begin round: what turns them is small at first
+        before, one, other = (getattr(each, name) for each in (gaussians, ours, theirs))
+        assert np.abs(other - before).max() > 1e-3 and relative(one - before, other - before) < apart
+    np.testing.assert_allclose(ours.rgb, gaussians.rgb, atol=1e-6)
+    np.testing.assert_array_equal(pose, task.poses.pose[task.trained])
+
+
+def test_outlines_from_sides_that_no_frame_shows_become_as_sharp_as_on_the_cpu():
+    from gsac.avatar.raster import render_bound
+    from gsac.avatar.threads import Workspace
+    from gsac.stages.train.fast.cpu import Cpu
+    from gsac.stages.train.fast.cuda import Cuda
+    from gsac.stages.train.poses.unseen_sides import turned_vertices
+
+    def blur(backend, looks):
+        task = turning(range(4, 12), size=(160, 240), steps=300, gaussians=2000)
+        sides = task.sides
+        assert len(sides) > 8
+        if not looks:
+            task.sides = []
+        trainer, _, coarse = backend.train(task, 2000)
+        gaussians = trainer.finish(coarse)[0]
+        faces = task.poses.body.faces
+        alphas = [render_bound(turned_vertices(task.poses, t, turn), faces, gaussians, view.camera, Workspace()).alpha
+                  for t, turn, view in sides]
+        return sum(float((alpha * (1 - alpha)).sum()) for alpha in alphas)
+
+    without, on_gpu, on_cpu = blur(Cuda(), False), blur(Cuda(), True), blur(Cpu(), True)
+    assert on_gpu < 0.95 * without and on_gpu == pytest.approx(on_cpu, rel=0.1)
