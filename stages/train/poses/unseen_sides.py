@@ -59,7 +59,7 @@ def find_sides(poses: Poses, trained: np.ndarray, camera: Camera) -> list[Side]:
 
 
 def turned_vertices(poses: Poses, t: int, turn: np.ndarray) -> np.ndarray:
-    """(V, 3) float32 m, the body of frame t turned by (3, 3) about its pelvis."""
+    """(V, 3) float32 m, the body of frame t, turned about its pelvis. turn: (3, 3)."""
     pelvis = poses.rest(t)[1][0] + poses.transl[t]
     return ((poses.vertices(t) - pelvis) @ turn.T + pelvis).astype(np.float32)
 
