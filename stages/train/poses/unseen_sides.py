@@ -26,6 +26,8 @@ SHARP = 1.0
 """Weight of the L2 between alpha and its own outline, which is where it is a half."""
 NEAREST = 0.2
 """m of depth, at least, of a body that the camera sees."""
+HIGHEST = 2
+"""Heights of the camera's image, at most, of a side: of somebody near, of whom frames show a part, the whole body is many."""
 
 
 class Side(NamedTuple):
@@ -54,7 +56,7 @@ def find_sides(poses: Poses, trained: np.ndarray, camera: Camera) -> list[Side]:
         turn = rotation.about_y(own - wanted)
         vertices = turned_vertices(fitted, t, turn)
         if vertices[:, 2].min() > NEAREST:
-            sides.append(Side(t, turn, empty_view(vertices, camera)))
+            sides.append(Side(t, turn, empty_view(vertices, camera).reduced(HIGHEST * camera.height)))
     return sides
 
 

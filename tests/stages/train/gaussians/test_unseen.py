@@ -169,7 +169,7 @@ def test_a_disc_that_sticks_out_of_the_surface_shrinks(body):
     gaussians.quat[out_of] = [np.sqrt(0.5), np.sqrt(0.5), 0, 0]
     gaussians.log_scale[out_of, 2] = np.log(0.05 / size[out_of])
     out = heights.level_heights(gaussians, at_rest(body))
-    assert (size * np.exp(out.log_scale[:, 2]))[out_of].max() < heights.STEP
+    assert 0.2 * heights.STEP < (size * np.exp(out.log_scale[:, 2]))[out_of].max() < heights.STEP
 
 
 def test_a_spike_is_cut_and_cloth_that_is_as_uneven_everywhere_stays(body):

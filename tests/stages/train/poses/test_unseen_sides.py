@@ -10,7 +10,7 @@ from gsac.avatar.yaw import yaw
 from gsac.stages.train.fast.initial_gaussians import init_gaussians
 from gsac.stages.train.fast.trainer import Room, Step, Trainer
 from gsac.stages.train.poses.poses import Poses
-from gsac.stages.train.poses.unseen_sides import APART, BEGIN, EVERY, LOOKED_AT, find_sides, side_at, turned_vertices
+from gsac.stages.train.poses.unseen_sides import APART, BEGIN, EVERY, HIGHEST, LOOKED_AT, find_sides, side_at, turned_vertices
 from gsac.stages.train.views import person_crop
 from support.train_task import task_of
 
@@ -70,6 +70,19 @@ def test_a_body_that_would_be_turned_into_the_camera_is_not_looked_at(task):
     assert find_sides(Poses(task.poses.body, params), task.trained, task.views[0].frame) == []
 
 
+def test_of_somebody_near_whom_frames_show_in_part_no_side_is_larger_than_two_frames_and_it_shows_all_of_the_body(task):
+    task.trained = np.arange(9)
+    params, camera = task.poses.params, task.views[0].frame
+    params.transl = params.transl * np.float32([1, 1, 0.22])
+    poses = Poses(task.poses.body, params)
+    sides = find_sides(poses, task.trained, camera)
+    assert max(side.view.camera.height for side in sides) == HIGHEST * camera.height
+    for t, turn, view in sides:
+        at = view.camera.project(turned_vertices(poses, t, turn))
+        assert (at >= 0).all() and (at <= [view.camera.width, view.camera.height]).all()
+        assert view.pixels.shape[:2] == (view.camera.height, view.camera.width)
+
+
 def test_every_third_step_late_in_a_training_is_made_on_a_side_each_in_its_turn():
     steps = 600
     found = [side_at(number, number / steps, 5) for number in range(steps)]
@@ -115,6 +128,7 @@ def test_steps_on_sides_sharpen_the_outline_and_leave_colours_poses_gains_and_un
     np.testing.assert_array_equal(task.poses.transl, transl)
     np.testing.assert_array_equal(task.poses.count, count)
     assert trainer.gains.keys() == gains.keys() == {0}
+    np.testing.assert_array_equal(trainer.gains[0], gains[0])
 
 
 def test_the_gradient_of_an_outline_is_that_of_alphas_distance_from_its_own_half(task):
